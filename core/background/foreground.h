@@ -1,0 +1,40 @@
+// Foreground statistics of a solved window, and the four pictures that users can ask for.
+#pragma once
+
+#include "core/background/background_model.h"
+#include "core/background/image_view.h"
+
+namespace qdmd {
+
+enum class Output {
+  background,  // L(t)
+  foreground,  // |x - L| per channel
+  mask,        // white where |x - L| exceeds the threshold, else black
+  cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
+};
+
+struct ForegroundStatistics {
+  double noise = 0;      // standard deviation of one channel, grey levels
+  double threshold = 0;  // quaternion norm in grey levels above which a pixel is foreground
+  double ratio = 0;      // share of the sampled pixels above the threshold, 0 .. 1
+};
+
+// The threshold that suits a noise level: max(4 sqrt(3) sigma, 18) grey levels of quaternion norm.
+double automatic_threshold(double noise);
+
+// Looks at a sample of the window's residuals |x_t - L(t)| (quaternion norm). The noise comes from
+// their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
+// for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
+// `fixed_threshold`, or, where that is 0, the automatic one.
+// Leaves the model's time at the last sampled snapshot.
+ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel& model,
+                                           double fixed_threshold);
+
+// Writes the picture `output` of the snapshot in `slot` of `window` against the model at its
+// current time. `alpha`: the frame's own alpha samples in row order, or null where all of them are
+// `constant_alpha`.
+void write_output(const Window& window, int slot, const BackgroundModel& model, Output output,
+                  double threshold, const uint8_t* alpha, uint8_t constant_alpha,
+                  const MutableImageView& out);
+
+}  // namespace qdmd

@@ -1,0 +1,67 @@
+#include "core/dmd/decompose.h"
+
+#include "core/dmd/channel_dmd.h"
+#include "core/dmd/qdmd.h"
+
+namespace qdmd {
+namespace {
+
+QuaternionMatrixd pixels_of(const Window& window) {
+  const auto n = static_cast<Eigen::Index>(window.pixels());
+  QuaternionMatrixd x(n, window.size());
+  for (int t = 0; t < window.size(); ++t) {
+    const int slot = window.slot(t);
+    const uint8_t* r = window.plane(slot, 0);
+    const uint8_t* g = window.plane(slot, 1);
+    const uint8_t* b = window.plane(slot, 2);
+    for (Eigen::Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
+  }
+  return x;
+}
+
+Decomposition single_snapshot() {
+  Decomposition result;
+  result.background = TemporalModel(1);
+  QuaternionMatrixd one(1, 1);
+  one.set(0, 0, Quaterniond(1.0));
+  result.background.add_mode(one, 1.0, 0, Quaterniond(1.0));
+  result.summary.rank = 1;
+  result.summary.background_modes = 1;
+  result.summary.lambda = 1;
+  return result;
+}
+
+Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& options) {
+  Decomposition result;
+  result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
+  for (int c = 0; c < kChannels; ++c) {
+    const ChannelModes modes = channel_dmd(channel_gram(gram, c), options);
+    for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)
+      result.background.add_channel_mode(c, modes.combination.col(p), modes.eigenvalues(p),
+                                         modes.reference_times(p), modes.amplitudes(p));
+    const bool converged = result.summary.converged && modes.summary.converged;
+    if (c == 0 || modes.summary.omega > result.summary.omega) result.summary = modes.summary;
+    result.summary.converged = converged;
+  }
+  return result;
+}
+
+}  // namespace
+
+Decomposition decompose(const Window& window, const IntegerMatrix& gram,
+                        const DmdOptions& options) {
+  if (gram.rows() == kChannels) return single_snapshot();
+  if (options.method == Method::dmd) return decompose_channels(gram, options);
+  const BackgroundModes modes = options.solver == Solver::adjoint
+                                    ? qdmd_from_adjoint(pixels_of(window), options)
+                                    : qdmd_from_gram(quaternion_gram(gram), options);
+  Decomposition result;
+  result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
+  for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)
+    result.background.add_mode(modes.combination.col(p), modes.eigenvalues(p),
+                               modes.reference_times(p), modes.amplitudes.get(p, 0));
+  result.summary = modes.summary;
+  return result;
+}
+
+}  // namespace qdmd

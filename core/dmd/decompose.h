@@ -1,0 +1,19 @@
+// One call from a window and its Gram matrix to L(t).
+#pragma once
+
+#include "core/dmd/options.h"
+#include "core/dmd/temporal_model.h"
+#include "core/gram/gram.h"
+
+namespace qdmd {
+
+struct Decomposition {
+  TemporalModel background;
+  DmdSummary summary;
+};
+
+// `gram` is the exact Gram matrix of `window` in time order (3m x 3m). The pixels are read by
+// Solver::adjoint only. m >= 1; a single snapshot is its own background.
+Decomposition decompose(const Window& window, const IntegerMatrix& gram, const DmdOptions& options);
+
+}  // namespace qdmd

@@ -1,0 +1,47 @@
+// What a decomposition is asked for, and what it reports.
+#pragma once
+
+#include <complex>
+
+namespace qdmd {
+
+enum class Method {
+  qdmd,  // quaternion DMD, the paper's Algorithm 2
+  dmd    // exact DMD of each colour channel by itself, the paper's Algorithm 1
+};
+
+enum class Solver {
+  gram,    // from the exact Gram matrix alone
+  adjoint  // the paper's procedure, literally, on the complex adjoint of the pixels
+};
+
+enum class Amplitude {
+  window,      // least squares of the background modes over all snapshots
+  first_frame  // b = Phi^+ x_1, the paper's
+};
+
+struct DmdOptions {
+  Method method = Method::qdmd;
+  Solver solver = Solver::gram;
+  Amplitude amplitude = Amplitude::window;
+  // Rank of the truncated decomposition; 0, or more than the numerical rank: full.
+  int rank = 0;
+  // Background: all modes with |omega| <= this, in rad/frame. 0, or no mode that near: the one
+  // nearest the origin.
+  double omega_threshold = 0;
+};
+
+// Facts about one solve, of the mode nearest the origin (for Method::dmd: of the channel whose
+// mode is farthest from it).
+struct DmdSummary {
+  int rank = 0;                     // of X, after truncation
+  int background_modes = 0;         // 0 where X is zero
+  std::complex<double> lambda = 0;  // eigenvalue, imaginary part >= 0
+  double omega = 0;                 // |ln lambda|, rad/frame; infinity where lambda = 0
+  double residual = 0;              // |Q~ w - w lambda| / (|Q~| |w|)
+  double condition = 1;             // largest over smallest singular value that was kept
+  // False: the eigenvalue iteration did not end, and rank one was solved in its place.
+  bool converged = true;
+};
+
+}  // namespace qdmd

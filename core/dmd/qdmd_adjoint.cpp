@@ -1,0 +1,136 @@
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/dmd/qdmd.h"
+
+namespace qdmd {
+namespace {
+
+// Every other column, the first included (the paper's col_odd).
+Eigen::MatrixXcd odd_columns(const Eigen::MatrixXcd& m, Eigen::Index count) {
+  Eigen::MatrixXcd odd(m.rows(), count);
+  for (Eigen::Index k = 0; k < count; ++k) odd.col(k) = m.col(2 * k);
+  return odd;
+}
+
+// The standard eigenvalues among the 2r eigenvalues of an adjoint, as r indices: of each
+// conjugate pair the one with the non-negative imaginary part. Sorted by real part and then by
+// distance from the real axis, pairs are neighbours; a real eigenvalue stands there twice.
+std::vector<Eigen::Index> standard_eigenvalues(const Eigen::VectorXcd& values) {
+  const double tolerance = 1e-9 * std::max(1.0, values.cwiseAbs().maxCoeff());
+  std::vector<Eigen::Index> upper, real;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values(i).imag() > tolerance)
+      upper.push_back(i);
+    else if (values(i).imag() >= -tolerance)
+      real.push_back(i);
+  }
+  std::sort(real.begin(), real.end(),
+            [&](Eigen::Index l, Eigen::Index r) { return values(l).real() < values(r).real(); });
+  for (size_t i = 0; i < real.size(); i += 2) upper.push_back(real[i]);
+  return upper;
+}
+
+}  // namespace
+
+double adjoint_bytes(double pixels, double snapshots) {
+  // The adjoint of X, its copy inside the SVD, U and the modes: 2n x 2m complex doubles each.
+  return 4 * sizeof(std::complex<double>) * (2 * pixels) * (2 * snapshots);
+}
+
+BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& options) {
+  using Index = Eigen::Index;
+  BackgroundModes result;
+  const Index m = x.cols();
+  result.combination = QuaternionMatrixd(m, 0);
+  result.amplitudes = QuaternionMatrixd(0, 1);
+  if (m < 2 || x.rows() == 0) return result;
+  const auto y = x.right_cols(m - 1);
+
+  // Step 1, by the complex representation's SVD.
+  const Eigen::BDCSVD<Eigen::MatrixXcd> svd(x.left_cols(m - 1).adjoint(),
+                                            Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::VectorXd& doubled = svd.singularValues();
+  const double tolerance = static_cast<double>(2 * std::max(x.rows(), m)) *
+                           std::numeric_limits<double>::epsilon() * doubled(0);
+  Index rank = 0;
+  while (2 * rank + 1 < doubled.size() && doubled(2 * rank) > tolerance) ++rank;
+  if (options.rank > 0) rank = std::min<Index>(rank, options.rank);
+  result.summary.rank = static_cast<int>(rank);
+  if (rank == 0) return result;
+  Eigen::VectorXd sigma(rank);
+  for (Index k = 0; k < rank; ++k) sigma(k) = doubled(2 * k);
+  result.summary.condition = sigma(0) / sigma(rank - 1);
+  const auto u = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.matrixU(), rank));
+  const auto v = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.matrixV(), rank));
+  const auto v_over_s = v.scale_cols(sigma.cwiseInverse());
+
+  // Steps 2 and 3.
+  const QuaternionMatrixd q_tilde = u.conjugate_transpose() * y * v_over_s;
+  const Eigen::ComplexEigenSolver<Eigen::MatrixXcd> eigen(q_tilde.adjoint());
+  const auto standard = standard_eigenvalues(eigen.eigenvalues());
+  const Index available = static_cast<Index>(standard.size());
+  if (eigen.info() != Eigen::Success || available == 0 || !eigen.eigenvectors().allFinite()) {
+    if (rank == 1) return result;
+    DmdOptions rank_one = options;
+    rank_one.rank = 1;
+    result = qdmd_from_adjoint(x, rank_one);
+    result.summary.converged = false;
+    return result;
+  }
+  Eigen::VectorXcd eigenvalues(available);
+  Eigen::MatrixXcd columns(2 * rank, available);
+  for (Index k = 0; k < available; ++k) {
+    const std::complex<double> value = eigen.eigenvalues()(standard[static_cast<size_t>(k)]);
+    eigenvalues(k) = {value.real(), std::max(0.0, value.imag())};
+    columns.col(k) = eigen.eigenvectors().col(standard[static_cast<size_t>(k)]);
+  }
+  const auto w = QuaternionMatrixd::from_adjoint_columns(columns);
+
+  // Step 4, then the background's share.
+  const QuaternionMatrixd lower = v_over_s * w;
+  const QuaternionMatrixd phi = y * lower;
+  const auto chosen = select_background(eigenvalues, options.omega_threshold);
+  const Index modes = static_cast<Index>(chosen.size());
+  result.eigenvalues.resize(modes);
+  result.combination = QuaternionMatrixd(m, modes);
+  result.reference_times = Eigen::VectorXd::Zero(modes);
+  QuaternionMatrixd background(x.rows(), modes);
+  for (Index p = 0; p < modes; ++p) {
+    const Index k = chosen[static_cast<size_t>(p)];
+    result.eigenvalues(p) = eigenvalues(k);
+    result.combination.a.col(p).tail(m - 1) = lower.a.col(k);
+    result.combination.b.col(p).tail(m - 1) = lower.b.col(k);
+    background.a.col(p) = phi.a.col(k);
+    background.b.col(p) = phi.b.col(k);
+  }
+  if (options.amplitude == Amplitude::window) {
+    for (Index p = 0; p < modes; ++p)
+      result.reference_times(p) = fit_reference_time(result.eigenvalues(p), m);
+    const auto phi_h = background.conjugate_transpose();
+    result.amplitudes = fit_window_amplitudes(result.eigenvalues, result.reference_times,
+                                              phi_h * background, phi_h * x);
+  } else {
+    const auto b = first_frame_amplitudes(phi, x.col(0));
+    result.amplitudes = QuaternionMatrixd(modes, 1);
+    for (Index p = 0; p < modes; ++p)
+      result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
+  }
+
+  result.summary.background_modes = static_cast<int>(modes);
+  result.summary.lambda = result.eigenvalues(0);
+  result.summary.omega = omega_magnitude(result.summary.lambda);
+  QuaternionMatrixd vector = w.col(chosen[0]);
+  QuaternionMatrixd error = q_tilde * vector;
+  const double vector_size = vector.norm();
+  vector.scale_col(0, Quaterniond(result.summary.lambda));
+  error -= vector;
+  const double size = q_tilde.norm() * vector_size;
+  result.summary.residual = size > 0 ? error.norm() / size : 0;
+  return result;
+}
+
+}  // namespace qdmd

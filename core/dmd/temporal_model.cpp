@@ -1,0 +1,71 @@
+#include "core/dmd/temporal_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace qdmd {
+
+std::complex<double> power(std::complex<double> lambda, double t) {
+  constexpr double kLargestExponent = 600;
+  if (t == 0) return 1;
+  if (lambda == 0.0) return 0;
+  const double exponent = std::min(std::log(std::abs(lambda)) * t, kLargestExponent);
+  return std::polar(std::exp(exponent), std::arg(lambda) * t);
+}
+
+void TemporalModel::add_mode(const QuaternionMatrixd& combination, std::complex<double> lambda,
+                             double reference_time, const Quaterniond& amplitude) {
+  terms_.push_back({-1, picture_count(), 4, lambda, reference_time, amplitude});
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3 * snapshots_, 4);
+  for (int t = 0; t < snapshots_; ++t) {
+    const Quaterniond c = combination.get(t, 0);
+    // (R i + G j + B k) c, one column for each of the parts 1, i, j, k.
+    rows.block<3, 4>(3 * t, 0) << -c.x, c.w, -c.z, c.y,  //
+        -c.y, c.z, c.w, -c.x,                            //
+        -c.z, -c.y, c.x, c.w;
+  }
+  for (int i = 0; i < 4; ++i) rows_.push_back(rows.col(i));
+}
+
+void TemporalModel::add_channel_mode(int channel, const Eigen::VectorXcd& combination,
+                                     std::complex<double> lambda, double reference_time,
+                                     std::complex<double> amplitude) {
+  const int row_count = combination.imag().isZero(0) ? 1 : 2;
+  terms_.push_back(
+      {channel, picture_count(), row_count, lambda, reference_time, Quaterniond(amplitude)});
+  const auto add_row = [&](const Eigen::VectorXd& part) {
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(3 * snapshots_);
+    for (int t = 0; t < snapshots_; ++t) row(3 * t + channel) = part(t);
+    rows_.push_back(row);
+  };
+  add_row(combination.real());
+  // A real mode needs one picture.
+  if (row_count == 2) add_row(combination.imag());
+}
+
+Eigen::MatrixXd TemporalModel::basis() const {
+  Eigen::MatrixXd basis(picture_count(), 3 * snapshots_);
+  for (size_t k = 0; k < rows_.size(); ++k)
+    basis.row(static_cast<Eigen::Index>(k)) = rows_[k].transpose();
+  return basis;
+}
+
+Eigen::MatrixXd TemporalModel::weights(double t) const {
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, picture_count());
+  for (const Term& term : terms_) {
+    const Quaterniond u = Quaterniond(power(term.lambda, t - term.reference_time)) * term.amplitude;
+    if (term.channel < 0) {
+      // The i, j and k parts of phi u, phi's parts along the columns.
+      weights.block<3, 4>(0, term.first_row) << u.x, u.w, u.z, -u.y,  //
+          u.y, -u.z, u.w, u.x,                                        //
+          u.z, u.y, -u.x, u.w;
+    } else {
+      weights(term.channel, term.first_row) = u.w;
+      if (term.row_count == 2) weights(term.channel, term.first_row + 1) = -u.x;
+    }
+  }
+  static constexpr double kLargest = 1e30;
+  return weights.unaryExpr([](double v) { return std::clamp(v, -kLargest, kLargest); });
+}
+
+}  // namespace qdmd

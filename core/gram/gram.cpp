@@ -1,0 +1,67 @@
+#include "core/gram/gram.h"
+
+#include <array>
+#include <vector>
+
+#include "core/gram/kernel.h"
+
+namespace qdmd {
+
+SlidingGram::SlidingGram(int capacity)
+    : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)) {}
+
+void SlidingGram::add_newest(const Window& window) {
+  const int size = window.size();
+  const int newest = window.slot(size - 1);
+  std::array<const uint8_t*, kChannels> rows;
+  for (int c = 0; c < kChannels; ++c) rows[static_cast<size_t>(c)] = window.plane(newest, c);
+  std::vector<const uint8_t*> cols;
+  cols.reserve(static_cast<size_t>(size) * kChannels);
+  for (int t = 0; t < size; ++t)
+    for (int c = 0; c < kChannels; ++c) cols.push_back(window.plane(window.slot(t), c));
+  Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products(
+      kChannels, kChannels * size);
+  dot_products(rows.data(), rows.size(), cols.data(), cols.size(), window.plane_size(),
+               products.data());
+  for (int t = 0; t < size; ++t) {
+    const int slot = window.slot(t);
+    const auto block = products.block<kChannels, kChannels>(0, kChannels * t);
+    by_slot_.block<kChannels, kChannels>(kChannels * newest, kChannels * slot) = block;
+    by_slot_.block<kChannels, kChannels>(kChannels * slot, kChannels * newest) = block.transpose();
+  }
+}
+
+IntegerMatrix SlidingGram::matrix(const Window& window) const {
+  const int size = window.size();
+  IntegerMatrix gram(kChannels * size, kChannels * size);
+  for (int t = 0; t < size; ++t)
+    for (int s = 0; s < size; ++s)
+      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) =
+          by_slot_.block<kChannels, kChannels>(kChannels * window.slot(s),
+                                               kChannels * window.slot(t));
+  return gram;
+}
+
+QuaternionMatrixd quaternion_gram(const IntegerMatrix& gram) {
+  const Eigen::Index m = gram.rows() / kChannels;
+  QuaternionMatrixd g(m, m);
+  for (Eigen::Index t = 0; t < m; ++t)
+    for (Eigen::Index s = 0; s < m; ++s) {
+      const auto p = gram.block<kChannels, kChannels>(kChannels * s, kChannels * t);
+      g.a(s, t) = {static_cast<double>(p(0, 0) + p(1, 1) + p(2, 2)),
+                   static_cast<double>(p(2, 1) - p(1, 2))};
+      g.b(s, t) = {static_cast<double>(p(0, 2) - p(2, 0)), static_cast<double>(p(1, 0) - p(0, 1))};
+    }
+  return g;
+}
+
+Eigen::MatrixXd channel_gram(const IntegerMatrix& gram, int channel) {
+  const Eigen::Index m = gram.rows() / kChannels;
+  Eigen::MatrixXd g(m, m);
+  for (Eigen::Index t = 0; t < m; ++t)
+    for (Eigen::Index s = 0; s < m; ++s)
+      g(s, t) = static_cast<double>(gram(kChannels * s + channel, kChannels * t + channel));
+  return g;
+}
+
+}  // namespace qdmd

@@ -1,0 +1,14 @@
+// Exact inner products of 8-bit planes: the one place where the Gram matrix touches pixels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace qdmd {
+
+// out[i * col_count + j] = sum over p < length of rows[i][p] * cols[j][p], exactly.
+// `length` may be anything up to 2^46; the sums are integers below 2^63.
+void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+                  size_t col_count, size_t length, int64_t* out);
+
+}  // namespace qdmd

@@ -1,0 +1,109 @@
+// Scalar quaternions over any real type, with the paper's exponential and logarithm.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <limits>
+
+namespace qdmd {
+
+// q = w + x i + y j + z k. Real is double, a wider float or a multiprecision type.
+// The same number as a pair of complex numbers is q = (w + x i) + (y + z i) j.
+template <typename Real>
+struct Quaternion {
+  Real w{0}, x{0}, y{0}, z{0};
+
+  using Complex = std::complex<Real>;
+
+  Quaternion() = default;
+  Quaternion(Real w_, Real x_, Real y_, Real z_) : w(w_), x(x_), y(y_), z(z_) {}
+  explicit Quaternion(Real real) : w(real) {}
+  explicit Quaternion(const Complex& a, const Complex& b = Complex(Real(0)))
+      : w(a.real()), x(a.imag()), y(b.real()), z(b.imag()) {}
+
+  Complex a() const { return Complex(w, x); }
+  Complex b() const { return Complex(y, z); }
+
+  Quaternion conj() const { return {w, -x, -y, -z}; }
+  Real squared_norm() const { return w * w + x * x + y * y + z * z; }
+  Real norm() const {
+    using std::sqrt;
+    return sqrt(squared_norm());
+  }
+  // Length of the vector part V(q).
+  Real vector_norm() const {
+    using std::sqrt;
+    return sqrt(x * x + y * y + z * z);
+  }
+  // q / |q|; one where q is zero, so that it can always serve as a phase.
+  Quaternion unit() const {
+    const Real length = norm();
+    return length > Real(0) ? *this * (Real(1) / length) : Quaternion(Real(1));
+  }
+
+  Quaternion operator-() const { return {-w, -x, -y, -z}; }
+  Quaternion& operator+=(const Quaternion& q) {
+    w += q.w, x += q.x, y += q.y, z += q.z;
+    return *this;
+  }
+  Quaternion& operator-=(const Quaternion& q) {
+    w -= q.w, x -= q.x, y -= q.y, z -= q.z;
+    return *this;
+  }
+  friend Quaternion operator+(Quaternion p, const Quaternion& q) { return p += q; }
+  friend Quaternion operator-(Quaternion p, const Quaternion& q) { return p -= q; }
+  friend Quaternion operator*(const Quaternion& p, const Quaternion& q) {
+    return {p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z,
+            p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+            p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
+            p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
+  }
+  friend Quaternion operator*(const Quaternion& p, const Real& s) {
+    return {p.w * s, p.x * s, p.y * s, p.z * s};
+  }
+};
+
+using Quaterniond = Quaternion<double>;
+
+// e^q = e^S(q) (cos|V(q)| + V(q)/|V(q)| sin|V(q)|), the paper's exponential of a full quaternion.
+// A null vector part is the real exponential.
+template <typename Real>
+Quaternion<Real> exp(const Quaternion<Real>& q) {
+  using std::cos, std::exp, std::sin;
+  const Real angle = q.vector_norm();
+  const Real scale = exp(q.w);
+  // sin(angle) / angle is 1 to within rounding below the square root of epsilon.
+  const Real sinc = angle > Real(0) ? Real(sin(angle) / angle) : Real(1);
+  const Real s = scale * sinc;
+  return {scale * cos(angle), q.x * s, q.y * s, q.z * s};
+}
+
+// ln q = ln|q| + V(q)/|V(q)| atan2(|V(q)|, S(q)), the paper's logarithm with its arctan read as
+// atan2 so that every quadrant is right. A negative real has no axis of its own: i is taken, the
+// choice that makes ln agree with the principal complex logarithm. ln 0 is -infinity + 0.
+template <typename Real>
+Quaternion<Real> log(const Quaternion<Real>& q) {
+  using std::atan2, std::log;
+  const Real length = q.norm();
+  if (!(length > Real(0))) return Quaternion<Real>(-std::numeric_limits<Real>::infinity());
+  const Real sine = q.vector_norm();
+  const Real angle = atan2(sine, q.w);
+  if (!(sine > Real(0))) return {log(length), angle, Real(0), Real(0)};
+  const Real s = angle / sine;
+  return {log(length), q.x * s, q.y * s, q.z * s};
+}
+
+// Unit d with conj(d) q d = S(q) + |V(q)| i: turns a quaternion into the representative of its
+// eigenvalue class that has a non-negative imaginary part (the paper's "Eigenvalue class").
+template <typename Real>
+Quaternion<Real> standardizing_rotation(const Quaternion<Real>& q) {
+  const Real sine = q.vector_norm();
+  if (!(sine > Real(0))) return Quaternion<Real>(Real(1));
+  const Quaternion<Real> u{Real(0), q.x / sine, q.y / sine, q.z / sine};
+  // d = u p + p i solves u d = d i for every p; p = 1 or j keeps d away from zero.
+  const Quaternion<Real> d = u.x >= Real(0) ? Quaternion<Real>{Real(0), u.x + Real(1), u.y, u.z}
+                                            : Quaternion<Real>{-u.y, -u.z, Real(0), u.x - Real(1)};
+  return d.unit();
+}
+
+}  // namespace qdmd

@@ -1,0 +1,260 @@
+// Schur form, standard eigenvalues and eigenvectors of square quaternion matrices.
+#pragma once
+
+#include <Eigen/Eigenvalues>
+#include <array>
+
+#include "core/quaternion/householder.h"
+
+namespace qdmd {
+
+// A = Q T Q^H, Q unitary, T upper triangular; the diagonal of T holds the standard eigenvalues
+// (complex, imaginary part >= 0). `converged` false: the iteration hit its limit, T is not
+// triangular and must not be used.
+template <typename Real>
+struct SchurForm {
+  QuaternionMatrix<Real> q, t;
+  bool converged = true;
+
+  Eigen::Matrix<std::complex<Real>, Eigen::Dynamic, 1> eigenvalues() const {
+    return t.a.diagonal();
+  }
+};
+
+namespace internal {
+
+// A row-major array of quaternion scalars: the QR sweeps touch two or three rows at a time.
+template <typename Real>
+class ScalarGrid {
+ public:
+  explicit ScalarGrid(const QuaternionMatrix<Real>& m)
+      : cols_(m.cols()), data_(static_cast<size_t>(m.rows() * m.cols())) {
+    for (Eigen::Index r = 0; r < m.rows(); ++r)
+      for (Eigen::Index c = 0; c < m.cols(); ++c) (*this)(r, c) = m.get(r, c);
+  }
+  Quaternion<Real>& operator()(Eigen::Index r, Eigen::Index c) {
+    return data_[static_cast<size_t>(r * cols_ + c)];
+  }
+  QuaternionMatrix<Real> matrix() {
+    const Eigen::Index rows = static_cast<Eigen::Index>(data_.size()) / cols_;
+    QuaternionMatrix<Real> m(rows, cols_);
+    for (Eigen::Index r = 0; r < rows; ++r)
+      for (Eigen::Index c = 0; c < cols_; ++c) m.set(r, c, (*this)(r, c));
+    return m;
+  }
+
+ private:
+  Eigen::Index cols_;
+  std::vector<Quaternion<Real>> data_;
+};
+
+// Two or three entries of a reflector I - tau v v^H.
+template <typename Real>
+struct SmallReflector {
+  std::array<Quaternion<Real>, 3> v;
+  Real tau{0};
+  int size = 0;
+
+  SmallReflector(const std::array<Quaternion<Real>, 3>& x, int size_) : v(x), size(size_) {
+    using std::sqrt;
+    Real squared(0), largest(0);
+    // Scaled by the largest entry: shifts square the entries of the matrix.
+    for (int i = 0; i < size; ++i) largest = std::max(largest, v[i].norm());
+    if (!(largest > Real(0))) return;
+    for (int i = 0; i < size; ++i) {
+      v[i] = v[i] * (Real(1) / largest);
+      squared += v[i].squared_norm();
+    }
+    v[0] += v[0].unit() * sqrt(squared);
+    squared = Real(0);
+    for (int i = 0; i < size; ++i) squared += v[i].squared_norm();
+    tau = Real(2) / squared;
+  }
+
+  void left(ScalarGrid<Real>& m, Eigen::Index row, Eigen::Index from, Eigen::Index to) const {
+    for (Eigen::Index c = from; c < to; ++c) {
+      Quaternion<Real> w;
+      for (int i = 0; i < size; ++i) w += v[i].conj() * m(row + i, c);
+      w = w * tau;
+      for (int i = 0; i < size; ++i) m(row + i, c) -= v[i] * w;
+    }
+  }
+  void right(ScalarGrid<Real>& m, Eigen::Index col, Eigen::Index from, Eigen::Index to) const {
+    for (Eigen::Index r = from; r < to; ++r) {
+      Quaternion<Real> u;
+      for (int i = 0; i < size; ++i) u += m(r, col + i) * v[i];
+      u = u * tau;
+      for (int i = 0; i < size; ++i) m(r, col + i) -= u * v[i].conj();
+    }
+  }
+};
+
+// Schur form of the adjoint of the 2 x 2 block at (k, k): its diagonal holds the block's two
+// standard eigenvalues and their conjugates, its first vector an eigenvector of the block.
+template <typename Real>
+Eigen::ComplexSchur<Eigen::Matrix<std::complex<Real>, 4, 4>> block_schur(ScalarGrid<Real>& h,
+                                                                         Eigen::Index k) {
+  QuaternionMatrix<Real> block(2, 2);
+  for (int r = 0; r < 2; ++r)
+    for (int c = 0; c < 2; ++c) block.set(r, c, h(k + r, k + c));
+  const Eigen::Matrix<std::complex<Real>, 4, 4> chi = block.adjoint();
+  return Eigen::ComplexSchur<Eigen::Matrix<std::complex<Real>, 4, 4>>(chi);
+}
+
+}  // namespace internal
+
+// Reduces m to upper Hessenberg form in place and returns Q with m_before = Q m_after Q^H.
+template <typename Real>
+QuaternionMatrix<Real> reduce_to_hessenberg(QuaternionMatrix<Real>& m) {
+  const Eigen::Index size = m.rows();
+  auto q = QuaternionMatrix<Real>::identity(size);
+  for (Eigen::Index k = 0; k + 2 < size; ++k) {
+    const Eigen::Index below = size - k - 1;
+    const auto h = make_reflector(m.block(k + 1, k, below, 1));
+    apply_left(h, m, k + 1, k + 1, below);
+    m.a.col(k).tail(below).setZero();
+    m.b.col(k).tail(below).setZero();
+    m.set(k + 1, k, h.alpha);
+    apply_right(h, m, 0, size, k + 1);
+    apply_right(h, q, 0, size, k + 1);
+  }
+  return q;
+}
+
+// Implicit double-shift QR algorithm on quaternions (Bunse-Gerstner, Byers and Mehrmann 1989):
+// the shift polynomial t^2 - 2 Re(s) t + |s|^2 has real coefficients, so it commutes with
+// quaternion arithmetic, and one step deflates a whole eigenvalue class. 2 x 2 blocks are split by
+// an eigenvector instead: there the polynomial vanishes when both eigenvalues share a class.
+template <typename Real>
+SchurForm<Real> schur(QuaternionMatrix<Real> m) {
+  using Index = Eigen::Index;
+  using Q = Quaternion<Real>;
+  using std::abs;
+  const Index size = m.rows();
+  SchurForm<Real> form;
+  const auto hessenberg_basis = reduce_to_hessenberg(m);
+  internal::ScalarGrid<Real> h(m), q(hessenberg_basis);
+  const Real epsilon = std::numeric_limits<Real>::epsilon();
+  const Real scale = m.norm();
+
+  constexpr int kIterationsPerEigenvalue = 60;
+  int iterations = 0;
+  Index hi = size - 1;
+  while (hi > 0) {
+    Index lo = hi;
+    for (; lo > 0; --lo) {
+      Real local = h(lo - 1, lo - 1).norm() + h(lo, lo).norm();
+      if (!(local > Real(0))) local = scale;
+      if (!(h(lo, lo - 1).norm() > epsilon * local)) {
+        h(lo, lo - 1) = Q();
+        break;
+      }
+    }
+    if (lo == hi) {
+      --hi;
+      iterations = 0;
+      continue;
+    }
+    if (++iterations > kIterationsPerEigenvalue) {
+      form.converged = false;
+      return form;
+    }
+    const auto block = internal::block_schur(h, hi - 1);
+    if (block.info() != Eigen::Success) {
+      form.converged = false;
+      return form;
+    }
+    if (lo == hi - 1) {
+      const auto vector =
+          QuaternionMatrix<Real>::from_adjoint_columns(block.matrixU().col(0).eval());
+      const internal::SmallReflector<Real> p({vector.get(0, 0), vector.get(1, 0), Q()}, 2);
+      p.left(h, lo, lo, size);
+      p.right(h, lo, 0, hi + 1);
+      p.right(q, lo, 0, size);
+      h(hi, lo) = Q();
+      hi -= 2;
+      iterations = 0;
+      continue;
+    }
+
+    // Shift: the eigenvalue of the trailing block whose class is nearest to the last element's.
+    const Q last = h(hi, hi);
+    const std::complex<Real> target(last.w, last.vector_norm());
+    std::complex<Real> shift = target;
+    if (iterations % 10 == 0) {
+      // Exceptional shift against cycles.
+      shift = target + std::complex<Real>(h(hi, hi - 1).norm(), h(hi - 1, hi - 2).norm());
+    } else {
+      Real best = std::numeric_limits<Real>::max();
+      for (int i = 0; i < 4; ++i) {
+        const std::complex<Real> value(block.matrixT()(i, i).real(),
+                                       abs(block.matrixT()(i, i).imag()));
+        const Real distance = abs(value - target);
+        if (distance < best) best = distance, shift = value;
+      }
+    }
+    const Real trace = Real(2) * shift.real();
+    const Real determinant = std::norm(shift);
+    const Q h00 = h(lo, lo), h10 = h(lo + 1, lo), h11 = h(lo + 1, lo + 1);
+    std::array<Q, 3> bulge = {h00 * h00 + h(lo, lo + 1) * h10 - h00 * trace + Q(determinant),
+                              h10 * h00 + h11 * h10 - h10 * trace, h(lo + 2, lo + 1) * h10};
+    for (Index k = lo; k < hi; ++k) {
+      const int count = static_cast<int>(std::min<Index>(3, hi - k + 1));
+      if (k > lo) bulge = {h(k, k - 1), h(k + 1, k - 1), count == 3 ? h(k + 2, k - 1) : Q()};
+      const internal::SmallReflector<Real> p(bulge, count);
+      p.left(h, k, k > lo ? k - 1 : lo, size);
+      p.right(h, k, 0, std::min(k + 3, hi) + 1);
+      p.right(q, k, 0, size);
+      if (k > lo)
+        for (int i = 1; i < count; ++i) h(k + i, k - 1) = Q();
+    }
+  }
+
+  form.t = h.matrix();
+  form.q = q.matrix();
+  for (Index k = 0; k < size; ++k) {
+    const Q value = form.t.get(k, k);
+    const Q d = standardizing_rotation(value);
+    form.t.scale_row(k, d.conj());
+    form.t.scale_col(k, d);
+    form.q.scale_col(k, d);
+    form.t.set(k, k, Q(value.w, value.vector_norm(), Real(0), Real(0)));
+    for (Index r = k + 1; r < size; ++r) form.t.set(r, k, Q());
+  }
+  return form;
+}
+
+// Eigenvector k of the triangular factor t of a Schur form, T w = w lambda_k: back substitution,
+// each step a scalar Sylvester equation lambda_i w - w lambda_k = r, which splits into two complex
+// divisions. Result: size x 1, norm 1, zero below k. A repeated eigenvalue divides by epsilon |T|
+// instead of zero, so a defective pair yields two nearly parallel vectors, never a NaN.
+template <typename Real>
+QuaternionMatrix<Real> triangular_eigenvector(const QuaternionMatrix<Real>& t, Eigen::Index k) {
+  using Complex = std::complex<Real>;
+  using std::abs;
+  QuaternionMatrix<Real> w(t.rows(), 1);
+  w.a(k, 0) = Complex(Real(1));
+  const Complex value = t.a(k, k);
+  const Real smallest =
+      std::max(std::numeric_limits<Real>::epsilon() * t.norm(), std::numeric_limits<Real>::min());
+  const auto safe = [&](Complex divisor) {
+    return abs(divisor) < smallest ? Complex(smallest) : divisor;
+  };
+  for (Eigen::Index i = k; i-- > 0;) {
+    const auto r = t.block(i, i + 1, 1, k - i) * w.block(i + 1, 0, k - i, 1);
+    w.a(i, 0) = -r.a(0, 0) / safe(t.a(i, i) - value);
+    w.b(i, 0) = -r.b(0, 0) / safe(t.a(i, i) - std::conj(value));
+    // Keeps growing vectors away from overflow; only the direction matters.
+    const Real size = std::max(abs(w.a(i, 0)), abs(w.b(i, 0)));
+    if (size > Real(1) / std::numeric_limits<Real>::epsilon()) {
+      w.a /= Complex(size);
+      w.b /= Complex(size);
+    }
+  }
+  const Complex length(w.norm());
+  w.a /= length;
+  w.b /= length;
+  return w;
+}
+
+}  // namespace qdmd
