@@ -1,0 +1,685 @@
+/**
+ * SECTION:element-qdmdbackground
+ * @title: qdmdbackground
+ * @short_description: Separates background and foreground of video from a camera that stands still
+ *
+ * qdmdbackground collects a window of frames, computes its quaternion dynamic mode decomposition
+ * (Q-DMD: each pixel is one pure quaternion R i + G j + B k, so the colour channels stay coupled),
+ * takes the mode that does not change in time for the background, and sends every frame on as the
+ * background, the foreground, a mask or a cut-out. Each output buffer has its own frame's
+ * timestamps, flags and metadata; as many buffers come out as went in.
+ *
+ * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window: the element
+ * reports a latency of (window-size - 1) frames. Keep audio in step with a queue of that
+ * max-size-time. Its window takes 3 x window-size x width x height bytes.
+ *
+ * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
+ * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"
+ * (exact DMD).
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball num-buffers=200 ! qdmdbackground window-size=50 ! \
+ *     videoconvert ! autovideosink
+ * ]| The ball disappears.
+ * |[
+ * gst-launch-1.0 filesrc location=street.avi ! decodebin ! videoconvert ! \
+ *     qdmdbackground output=mask ! videoconvert ! autovideosink
+ * ]| White where something moves.
+ *
+ * Since: 0.1
+ */
+#include "gst/gstqdmdbackground.h"
+
+#include <deque>
+#include <exception>
+#include <memory>
+#include <new>
+
+#include "core/background/engine.h"
+#include "gst/videoview.h"
+
+GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
+#define GST_CAT_DEFAULT qdmd_background_debug
+
+namespace {
+
+using qdmd::Engine;
+using qdmd::EngineOptions;
+using qdmd::MappedVideoFrame;
+using qdmd::Output;
+using qdmd::Status;
+
+// The latency of video without a frame rate is that of this rate.
+constexpr int kAssumedRate = 25;
+
+#define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
+
+enum Mode { MODE_BATCH };
+
+struct Settings {
+  Output output = Output::background;
+  Mode mode = MODE_BATCH;
+  EngineOptions engine;
+};
+
+struct UnrefBuffer {
+  void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
+};
+using BufferPtr = std::unique_ptr<GstBuffer, UnrefBuffer>;
+
+struct Private {
+  // Protected by the object lock.
+  Settings settings;
+  GstClockTime latency = 0;
+  guint64 frames_in = 0, frames_out = 0, solves = 0;
+  qdmd::SolveReport report;
+
+  // Protected by the stream lock.
+  Engine engine;
+  // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
+  // upstream's pools never wait for a window.
+  std::deque<BufferPtr> shells;
+};
+
+}  // namespace
+
+struct _GstQdmdBackground {
+  GstVideoFilter parent;
+  Private* priv;
+};
+
+#define gst_qdmd_background_parent_class parent_class
+G_DEFINE_TYPE_WITH_CODE(GstQdmdBackground, gst_qdmd_background, GST_TYPE_VIDEO_FILTER,
+                        GST_DEBUG_CATEGORY_INIT(qdmd_background_debug, "qdmdbackground", 0,
+                                                "Q-DMD background separation"))
+GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
+                            GST_TYPE_QDMD_BACKGROUND)
+
+// ---- Properties ---------------------------------------------------------------------------------
+
+enum {
+  PROP_0,
+  PROP_OUTPUT,
+  PROP_MODE,
+  PROP_WINDOW_SIZE,
+  PROP_METHOD,
+  PROP_RANK,
+  PROP_OMEGA_THRESHOLD,
+  PROP_AMPLITUDE,
+  PROP_SOLVER,
+  PROP_FOREGROUND_THRESHOLD,
+  PROP_MAX_MEMORY,
+  PROP_STATS
+};
+
+static GType gst_qdmd_background_output_get_type() {
+  static const GEnumValue values[] = {
+      {int(Output::background), "The background L(t) at the frame's time", "background"},
+      {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
+      {int(Output::mask), "White where the residual exceeds the threshold, else black", "mask"},
+      {int(Output::cutout),
+       "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundOutput", values);
+  return type;
+}
+
+static GType gst_qdmd_background_mode_get_type() {
+  static const GEnumValue values[] = {
+      {MODE_BATCH,
+       "Fill a window, solve, send its frames, each with its own L(t); a latency of "
+       "window-size - 1 frames",
+       "batch"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundMode", values);
+  return type;
+}
+
+static GType gst_qdmd_background_method_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Method::qdmd), "Quaternion DMD of the coupled colour channels", "qdmd"},
+      {int(qdmd::Method::dmd), "Exact DMD of each colour channel by itself", "dmd"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundMethod", values);
+  return type;
+}
+
+static GType gst_qdmd_background_amplitude_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Amplitude::window), "Fitted to all frames of the window (least squares)",
+       "window"},
+      {int(qdmd::Amplitude::first_frame), "Fitted to the first frame alone, as the paper does",
+       "first-frame"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundAmplitude", values);
+  return type;
+}
+
+static GType gst_qdmd_background_solver_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
+      {int(qdmd::Solver::adjoint),
+       "The paper's procedure, literally, on the pixels (slow, small windows only)", "adjoint"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundSolver", values);
+  return type;
+}
+
+static GstStructure* make_stats(const Private* priv) {
+  const auto& report = priv->report;
+  GstStructure* stats = gst_structure_new(
+      "qdmdbackground-stats", "frames-in", G_TYPE_UINT64, priv->frames_in, "frames-out",
+      G_TYPE_UINT64, priv->frames_out, "solves", G_TYPE_UINT64, priv->solves, "window-frames",
+      G_TYPE_UINT, guint(report.window_frames), "rank", G_TYPE_UINT, guint(report.dmd.rank),
+      "background-modes", G_TYPE_UINT, guint(report.dmd.background_modes), "omega", G_TYPE_DOUBLE,
+      report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual, "condition", G_TYPE_DOUBLE,
+      report.dmd.condition, "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged), "noise",
+      G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
+      report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
+      "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
+      nullptr);
+  GValue lambda = G_VALUE_INIT, part = G_VALUE_INIT;
+  gst_value_array_init(&lambda, 2);
+  g_value_init(&part, G_TYPE_DOUBLE);
+  for (double value : {report.dmd.lambda.real(), report.dmd.lambda.imag()}) {
+    g_value_set_double(&part, value);
+    gst_value_array_append_value(&lambda, &part);
+  }
+  gst_structure_take_value(stats, "lambda", &lambda);
+  g_value_unset(&part);
+  return stats;
+}
+
+static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
+                                             GParamSpec* spec) {
+  Private* priv = GST_QDMD_BACKGROUND(object)->priv;
+  GST_OBJECT_LOCK(object);
+  Settings& settings = priv->settings;
+  switch (id) {
+    case PROP_OUTPUT:
+      settings.output = Output(g_value_get_enum(value));
+      break;
+    case PROP_MODE:
+      settings.mode = Mode(g_value_get_enum(value));
+      break;
+    case PROP_WINDOW_SIZE:
+      settings.engine.window_size = int(g_value_get_uint(value));
+      break;
+    case PROP_METHOD:
+      settings.engine.dmd.method = qdmd::Method(g_value_get_enum(value));
+      break;
+    case PROP_RANK:
+      settings.engine.dmd.rank = int(g_value_get_uint(value));
+      break;
+    case PROP_OMEGA_THRESHOLD:
+      settings.engine.dmd.omega_threshold = g_value_get_double(value);
+      break;
+    case PROP_AMPLITUDE:
+      settings.engine.dmd.amplitude = qdmd::Amplitude(g_value_get_enum(value));
+      break;
+    case PROP_SOLVER:
+      settings.engine.dmd.solver = qdmd::Solver(g_value_get_enum(value));
+      break;
+    case PROP_FOREGROUND_THRESHOLD:
+      settings.engine.foreground_threshold = g_value_get_double(value);
+      break;
+    case PROP_MAX_MEMORY:
+      settings.engine.max_memory = g_value_get_uint64(value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+  GST_OBJECT_UNLOCK(object);
+}
+
+static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* value,
+                                             GParamSpec* spec) {
+  Private* priv = GST_QDMD_BACKGROUND(object)->priv;
+  GST_OBJECT_LOCK(object);
+  const Settings& settings = priv->settings;
+  switch (id) {
+    case PROP_OUTPUT:
+      g_value_set_enum(value, gint(settings.output));
+      break;
+    case PROP_MODE:
+      g_value_set_enum(value, gint(settings.mode));
+      break;
+    case PROP_WINDOW_SIZE:
+      g_value_set_uint(value, guint(settings.engine.window_size));
+      break;
+    case PROP_METHOD:
+      g_value_set_enum(value, gint(settings.engine.dmd.method));
+      break;
+    case PROP_RANK:
+      g_value_set_uint(value, guint(settings.engine.dmd.rank));
+      break;
+    case PROP_OMEGA_THRESHOLD:
+      g_value_set_double(value, settings.engine.dmd.omega_threshold);
+      break;
+    case PROP_AMPLITUDE:
+      g_value_set_enum(value, gint(settings.engine.dmd.amplitude));
+      break;
+    case PROP_SOLVER:
+      g_value_set_enum(value, gint(settings.engine.dmd.solver));
+      break;
+    case PROP_FOREGROUND_THRESHOLD:
+      g_value_set_double(value, settings.engine.foreground_threshold);
+      break;
+    case PROP_MAX_MEMORY:
+      g_value_set_uint64(value, settings.engine.max_memory);
+      break;
+    case PROP_STATS:
+      g_value_take_boxed(value, make_stats(priv));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+  GST_OBJECT_UNLOCK(object);
+}
+
+// ---- Frames through the engine ------------------------------------------------------------------
+
+// Posts what a refused engine call said. Called without locks.
+static void post_status(GstQdmdBackground* self, const Status& status) {
+  switch (status.code) {
+    case Status::Code::too_much_memory:
+      GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("%s", status.message.c_str()), (nullptr));
+      break;
+    case Status::Code::invalid_options:
+      GST_ELEMENT_ERROR(self, LIBRARY, SETTINGS, ("%s", status.message.c_str()), (nullptr));
+      break;
+    default:
+      GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", status.message.c_str()));
+      break;
+  }
+}
+
+// Runs `action` (returning Status); true if it succeeded, else an error is posted. No exception
+// gets past this.
+template <typename Action>
+static bool guarded(GstQdmdBackground* self, Action action) {
+  try {
+    const Status status = action();
+    if (status.ok()) return true;
+    post_status(self, status);
+  } catch (const std::bad_alloc&) {
+    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                      ("Not enough memory for the window: lower window-size or scale the video "
+                       "down."),
+                      (nullptr));
+  } catch (const std::exception& error) {
+    GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", error.what()));
+  }
+  return false;
+}
+
+static void drop_frames(GstQdmdBackground* self) {
+  self->priv->engine.flush();
+  self->priv->shells.clear();
+}
+
+// Copies what others may want to know of the engine.
+static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 frames_out) {
+  Private* priv = self->priv;
+  GST_OBJECT_LOCK(self);
+  priv->frames_in += frames_in;
+  priv->frames_out += frames_out;
+  priv->solves = priv->engine.solves();
+  priv->report = priv->engine.report();
+  GST_OBJECT_UNLOCK(self);
+}
+
+// The next ready frame as a buffer from the output pool, or null with OK where none is ready.
+static GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
+  Private* priv = self->priv;
+  GstBaseTransform* trans = GST_BASE_TRANSFORM(self);
+  *out = nullptr;
+  if (!priv->engine.ready()) return GST_FLOW_OK;
+
+  GST_OBJECT_LOCK(self);
+  const Output output = priv->settings.output;
+  const double threshold = priv->settings.engine.foreground_threshold;
+  GST_OBJECT_UNLOCK(self);
+
+  const BufferPtr shell = std::move(priv->shells.front());
+  priv->shells.pop_front();
+  GstBuffer* made = nullptr;
+  const GstFlowReturn flow =
+      GST_BASE_TRANSFORM_CLASS(parent_class)->prepare_output_buffer(trans, shell.get(), &made);
+  BufferPtr buffer(made);
+  if (flow != GST_FLOW_OK || !buffer) return flow;
+  {
+    const MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
+    if (!frame) {
+      GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
+      return GST_FLOW_ERROR;
+    }
+    const bool written = guarded(self, [&] {
+      priv->engine.set_foreground_threshold(threshold);
+      priv->engine.pop(output, frame.view<uint8_t>());
+      return Status();
+    });
+    if (!written) return GST_FLOW_ERROR;
+  }
+  publish_report(self, 0, 1);
+  *out = buffer.release();
+  return GST_FLOW_OK;
+}
+
+// Solves for what is left and pushes it. The caller holds the stream lock: sink events that are
+// serialized, and the streaming thread.
+static GstFlowReturn drain(GstQdmdBackground* self) {
+  Private* priv = self->priv;
+  if (priv->shells.empty()) {
+    // Nothing waits, but the next frame must not join a window that has ended.
+    drop_frames(self);
+    return GST_FLOW_OK;
+  }
+  GST_DEBUG_OBJECT(self, "draining %u frames", guint(priv->shells.size()));
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (!guarded(self, [&] { return priv->engine.drain(); })) flow = GST_FLOW_ERROR;
+  while (flow == GST_FLOW_OK && priv->engine.ready()) {
+    GstBuffer* buffer = nullptr;
+    flow = next_output(self, &buffer);
+    if (flow == GST_FLOW_OK && buffer)
+      flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
+  }
+  if (flow != GST_FLOW_OK)
+    GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(priv->shells.size()),
+                     gst_flow_get_name(flow));
+  drop_frames(self);
+  return flow;
+}
+
+static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* trans,
+                                                             gboolean is_discont,
+                                                             GstBuffer* input) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
+  Private* priv = self->priv;
+  // The base class keeps is_discont set until something was pushed, which can be a window later:
+  // the buffer's own flag says where time breaks.
+  if (GST_BUFFER_IS_DISCONT(input)) {
+    const GstFlowReturn flow = drain(self);
+    if (flow != GST_FLOW_OK) {
+      gst_buffer_unref(input);
+      return flow;
+    }
+  }
+
+  // The parent renegotiates where that is due and leaves the buffer in queued_buf.
+  const GstFlowReturn flow =
+      GST_BASE_TRANSFORM_CLASS(parent_class)->submit_input_buffer(trans, is_discont, input);
+  if (flow != GST_FLOW_OK) return flow;
+  const BufferPtr buffer(trans->queued_buf);
+  trans->queued_buf = nullptr;
+  if (!buffer) return GST_FLOW_OK;
+
+  BufferPtr shell(gst_buffer_new());
+  gst_buffer_copy_into(
+      shell.get(), buffer.get(),
+      GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
+      0, gsize(-1));
+  {
+    const MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->in_info, buffer.get(), GST_MAP_READ);
+    if (!frame) {
+      GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                        ("A buffer does not hold a frame of the negotiated caps."), (nullptr));
+      return GST_FLOW_ERROR;
+    }
+    const bool taken = guarded(self, [&] {
+      priv->shells.push_back(std::move(shell));
+      return priv->engine.push(frame.view<const uint8_t>());
+    });
+    if (!taken) {
+      drop_frames(self);
+      return GST_FLOW_ERROR;
+    }
+  }
+  publish_report(self, 1, 0);
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn gst_qdmd_background_generate_output(GstBaseTransform* trans, GstBuffer** out) {
+  return next_output(GST_QDMD_BACKGROUND(trans), out);
+}
+
+// GstVideoFilter works in place on elements without this function; frames never come here, they go
+// through submit_input_buffer and generate_output.
+static GstFlowReturn gst_qdmd_background_transform_frame(GstVideoFilter*, GstVideoFrame*,
+                                                         GstVideoFrame*) {
+  return GST_FLOW_NOT_SUPPORTED;
+}
+
+// ---- Negotiation, events, queries ---------------------------------------------------------------
+
+static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, GstVideoInfo* in,
+                                             GstCaps*, GstVideoInfo*) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(filter);
+  Private* priv = self->priv;
+
+  GST_OBJECT_LOCK(self);
+  const Settings settings = priv->settings;
+  GST_OBJECT_UNLOCK(self);
+
+  priv->shells.clear();
+  const bool configured = guarded(self, [&] {
+    return priv->engine.configure(settings.engine, GST_VIDEO_INFO_WIDTH(in),
+                                  GST_VIDEO_INFO_HEIGHT(in));
+  });
+  if (!configured) return FALSE;
+
+  const bool has_rate = GST_VIDEO_INFO_FPS_N(in) > 0 && GST_VIDEO_INFO_FPS_D(in) > 0;
+  const guint64 rate_n = has_rate ? guint64(GST_VIDEO_INFO_FPS_N(in)) : kAssumedRate;
+  const guint64 rate_d = has_rate ? guint64(GST_VIDEO_INFO_FPS_D(in)) : 1;
+  const GstClockTime latency =
+      gst_util_uint64_scale(guint64(settings.engine.window_size - 1) * GST_SECOND, rate_d, rate_n);
+  GST_OBJECT_LOCK(self);
+  const bool changed = latency != priv->latency;
+  priv->latency = latency;
+  GST_OBJECT_UNLOCK(self);
+  GST_INFO_OBJECT(self, "windows of %d frames, latency %" GST_TIME_FORMAT,
+                  settings.engine.window_size, GST_TIME_ARGS(latency));
+  if (changed)
+    gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  return TRUE;
+}
+
+static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent* event) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_CAPS: {
+      GstCaps* caps = nullptr;
+      GstVideoInfo info;
+      gst_event_parse_caps(event, &caps);
+      // Frames that wait belong to the old caps; equal caps change nothing.
+      if (!gst_video_info_from_caps(&info, caps) ||
+          !gst_video_info_is_equal(&info, &GST_VIDEO_FILTER(self)->in_info))
+        drain(self);
+      break;
+    }
+    case GST_EVENT_STREAM_START:
+    case GST_EVENT_SEGMENT:
+    case GST_EVENT_SEGMENT_DONE:
+    case GST_EVENT_GAP:
+    case GST_EVENT_EOS:
+      // The flow of these frames is not the event's: EOS goes on whatever they met.
+      drain(self);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      drop_frames(self);
+      break;
+    default:
+      break;
+  }
+  return GST_BASE_TRANSFORM_CLASS(parent_class)->sink_event(trans, event);
+}
+
+static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirection direction,
+                                          GstQuery* query) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
+  if (GST_QUERY_TYPE(query) != GST_QUERY_LATENCY || direction != GST_PAD_SRC)
+    return GST_BASE_TRANSFORM_CLASS(parent_class)->query(trans, direction, query);
+
+  if (!gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(trans), query)) return FALSE;
+  gboolean live = FALSE;
+  GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
+  gst_query_parse_latency(query, &live, &min, &max);
+  GST_OBJECT_LOCK(self);
+  const GstClockTime own = self->priv->latency;
+  GST_OBJECT_UNLOCK(self);
+  min += own;
+  if (GST_CLOCK_TIME_IS_VALID(max)) max += own;
+  gst_query_set_latency(query, live, min, max);
+  return TRUE;
+}
+
+// Metadata about the picture's geometry stays true: size and orientation do not change here.
+static gboolean gst_qdmd_background_transform_meta(GstBaseTransform*, GstBuffer*, GstMeta* meta,
+                                                   GstBuffer*) {
+  static const char* const kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_ORIENTATION_STR,
+                                     GST_META_TAG_VIDEO_SIZE_STR, GST_META_TAG_VIDEO_COLORSPACE_STR,
+                                     nullptr};
+  const gchar* const* tags = gst_meta_api_type_get_tags(meta->info->api);
+  for (; tags && *tags; ++tags)
+    if (!g_strv_contains(kept, *tags)) return FALSE;
+  return TRUE;
+}
+
+static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
+  Private* priv = self->priv;
+  GST_OBJECT_LOCK(self);
+  priv->frames_in = priv->frames_out = priv->solves = 0;
+  priv->report = qdmd::SolveReport();
+  GST_OBJECT_UNLOCK(self);
+  return TRUE;
+}
+
+static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
+  GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
+  drop_frames(self);
+  // An empty engine gives the window's memory back.
+  self->priv->engine = Engine();
+  return TRUE;
+}
+
+// ---- Class --------------------------------------------------------------------------------------
+
+static void gst_qdmd_background_finalize(GObject* object) {
+  delete GST_QDMD_BACKGROUND(object)->priv;
+  G_OBJECT_CLASS(parent_class)->finalize(object);
+}
+
+static void gst_qdmd_background_init(GstQdmdBackground* self) {
+  self->priv = new Private();
+  // A decomposition in time needs every frame.
+  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
+}
+
+static void install_properties(GObjectClass* object_class) {
+  const auto at_start =
+      GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+  const auto any_time =
+      GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const auto install = [&](guint id, GParamSpec* spec) {
+    g_object_class_install_property(object_class, id, spec);
+  };
+  const Settings defaults;
+  const auto& engine = defaults.engine;
+
+  install(PROP_OUTPUT, g_param_spec_enum(
+                           "output", "Output", "What is sent on in place of each frame",
+                           gst_qdmd_background_output_get_type(), gint(defaults.output), any_time));
+  install(PROP_MODE,
+          g_param_spec_enum("mode", "Mode", "When a model is computed and for which frames",
+                            gst_qdmd_background_mode_get_type(), gint(defaults.mode), at_start));
+  install(PROP_WINDOW_SIZE,
+          g_param_spec_uint("window-size", "Window size",
+                            "Frames that are decomposed together; more frames separate slow "
+                            "movers better and cost latency, memory (3 bytes per pixel and frame) "
+                            "and time",
+                            guint(EngineOptions::kMinWindow), guint(EngineOptions::kMaxWindow),
+                            guint(engine.window_size), at_start));
+  install(PROP_METHOD, g_param_spec_enum("method", "Method", "How a window is decomposed",
+                                         gst_qdmd_background_method_get_type(),
+                                         gint(engine.dmd.method), at_start));
+  install(PROP_RANK,
+          g_param_spec_uint("rank", "Rank",
+                            "Singular values that the decomposition keeps (0: all); a low rank is "
+                            "steadier where people stand still",
+                            0, guint(EngineOptions::kMaxWindow), guint(engine.dmd.rank), at_start));
+  install(PROP_OMEGA_THRESHOLD,
+          g_param_spec_double("omega-threshold", "Omega threshold",
+                              "Modes whose frequency and growth, abs(omega) in rad/frame, are at "
+                              "most this are background (0: only the one nearest zero)",
+                              0, G_MAXDOUBLE, engine.dmd.omega_threshold, at_start));
+  install(PROP_AMPLITUDE, g_param_spec_enum("amplitude", "Amplitude",
+                                            "Which frames decide how strong the background mode is",
+                                            gst_qdmd_background_amplitude_get_type(),
+                                            gint(engine.dmd.amplitude), at_start));
+  install(
+      PROP_SOLVER,
+      g_param_spec_enum("solver", "Solver", "How method=qdmd is computed; same picture, other cost",
+                        gst_qdmd_background_solver_get_type(), gint(engine.dmd.solver), at_start));
+  install(PROP_FOREGROUND_THRESHOLD,
+          g_param_spec_double("foreground-threshold", "Foreground threshold",
+                              "Distance from the background, the length of the RGB difference in "
+                              "grey levels, above which a pixel is foreground (0: from the noise "
+                              "of the window, at least 18)",
+                              0, 442, engine.foreground_threshold, any_time));
+  install(PROP_MAX_MEMORY,
+          g_param_spec_uint64("max-memory", "Maximum memory",
+                              "Bytes that the window may take; a larger one is an error", 0,
+                              G_MAXUINT64, engine.max_memory, at_start));
+  install(PROP_STATS,
+          g_param_spec_boxed("stats", "Statistics",
+                             "Counters, and facts about the newest solve: rank, lambda (real and "
+                             "imaginary part), omega in rad/frame, residual, condition, "
+                             "foreground-ratio (0 to 1), gram-time and solve-time in seconds",
+                             GST_TYPE_STRUCTURE,
+                             GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}
+
+static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  GstBaseTransformClass* trans_class = GST_BASE_TRANSFORM_CLASS(klass);
+  GstVideoFilterClass* filter_class = GST_VIDEO_FILTER_CLASS(klass);
+
+  object_class->set_property = gst_qdmd_background_set_property;
+  object_class->get_property = gst_qdmd_background_get_property;
+  object_class->finalize = gst_qdmd_background_finalize;
+  install_properties(object_class);
+
+  gst_element_class_set_static_metadata(
+      element_class, "Q-DMD background separator", "Filter/Effect/Video",
+      "Separates background and foreground of video from a static camera by quaternion dynamic "
+      "mode decomposition",
+      "The gst-qdmd authors <gst-qdmd@localhost>");
+  for (const auto& [name, direction] :
+       {std::pair{"sink", GST_PAD_SINK}, std::pair{"src", GST_PAD_SRC}}) {
+    GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+    gst_element_class_add_pad_template(element_class,
+                                       gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps));
+    gst_caps_unref(caps);
+  }
+
+  trans_class->start = GST_DEBUG_FUNCPTR(gst_qdmd_background_start);
+  trans_class->stop = GST_DEBUG_FUNCPTR(gst_qdmd_background_stop);
+  trans_class->submit_input_buffer = GST_DEBUG_FUNCPTR(gst_qdmd_background_submit_input_buffer);
+  trans_class->generate_output = GST_DEBUG_FUNCPTR(gst_qdmd_background_generate_output);
+  trans_class->sink_event = GST_DEBUG_FUNCPTR(gst_qdmd_background_sink_event);
+  trans_class->query = GST_DEBUG_FUNCPTR(gst_qdmd_background_query);
+  trans_class->transform_meta = GST_DEBUG_FUNCPTR(gst_qdmd_background_transform_meta);
+  filter_class->set_info = GST_DEBUG_FUNCPTR(gst_qdmd_background_set_info);
+  filter_class->transform_frame = GST_DEBUG_FUNCPTR(gst_qdmd_background_transform_frame);
+
+  for (GType type :
+       {gst_qdmd_background_output_get_type(), gst_qdmd_background_mode_get_type(),
+        gst_qdmd_background_method_get_type(), gst_qdmd_background_amplitude_get_type(),
+        gst_qdmd_background_solver_get_type()})
+    gst_type_mark_as_plugin_api(type, GstPluginAPIFlags(0));
+}
