@@ -495,7 +495,7 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
       GstVideoInfo info;
       gst_event_parse_caps(event, &caps);
       // Frames that wait belong to the old caps; equal caps change nothing.
-      if (!gst_video_info_from_caps(&info, caps) ||
+      if (!GST_VIDEO_FILTER(self)->negotiated || !gst_video_info_from_caps(&info, caps) ||
           !gst_video_info_is_equal(&info, &GST_VIDEO_FILTER(self)->in_info))
         drain(self);
       break;

@@ -1,6 +1,7 @@
 #include "core/gram/window.h"
 
 #include <cstring>
+#include <limits>
 #include <new>
 
 namespace qdmd {
@@ -17,7 +18,10 @@ void Window::Free::operator()(uint8_t* data) const {
 }
 
 uint64_t Window::bytes(int capacity, size_t pixels) {
-  return static_cast<uint64_t>(capacity) * kChannels * padded(pixels);
+  uint64_t bytes = 0;
+  if (__builtin_mul_overflow(static_cast<uint64_t>(capacity) * kChannels, padded(pixels), &bytes))
+    return std::numeric_limits<uint64_t>::max();
+  return bytes;
 }
 
 Window::Window(int capacity, size_t pixels)
