@@ -1,0 +1,269 @@
+// Formats, strides, latency, limits, states, properties.
+#include "tests/gst/element_test.h"
+
+namespace qdmd::test {
+namespace {
+
+const GstVideoFormat kFormats[] = {
+    GST_VIDEO_FORMAT_RGBx, GST_VIDEO_FORMAT_BGRx, GST_VIDEO_FORMAT_xRGB, GST_VIDEO_FORMAT_xBGR,
+    GST_VIDEO_FORMAT_RGBA, GST_VIDEO_FORMAT_BGRA, GST_VIDEO_FORMAT_ARGB, GST_VIDEO_FORMAT_ABGR,
+    GST_VIDEO_FORMAT_RGB,  GST_VIDEO_FORMAT_BGR};
+
+// The pictures of a short clip, as RGB triples and alpha, so that formats can be compared.
+std::vector<int> run_clip(const char* output, GstVideoFormat format, int width, int height,
+                          bool padded) {
+  Stream stream(std::string("qdmdbackground window-size=8 output=") + output, format, width,
+                height);
+  for (int t = 0; t < 8; ++t) {
+    BufferPtr buffer;
+    if (padded) {
+      // Rows 32 bytes longer than the format asks for, the picture 64 bytes into the buffer.
+      gsize offset[GST_VIDEO_MAX_PLANES] = {64};
+      gint stride[GST_VIDEO_MAX_PLANES] = {GST_VIDEO_INFO_PLANE_STRIDE(&stream.info(), 0) + 32};
+      buffer.reset(gst_buffer_new_allocate(
+          nullptr, 64 + static_cast<gsize>(stride[0]) * static_cast<gsize>(height), nullptr));
+      gst_buffer_memset(buffer.get(), 0, 0xa5, gst_buffer_get_size(buffer.get()));
+      gst_buffer_add_video_meta_full(buffer.get(), GST_VIDEO_FRAME_FLAG_NONE, format,
+                                     static_cast<guint>(width), static_cast<guint>(height), 1,
+                                     offset, stride);
+      stream.stamp(buffer.get(), t);
+      stream.fill(buffer.get(), t, paint_mover);
+    } else {
+      buffer = stream.make_frame(t, paint_mover);
+    }
+    EXPECT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  }
+  std::vector<int> seen;
+  for (const auto& buffer : stream.take_all())
+    stream.each_pixel(buffer.get(), [&](int x, int, const uint8_t* p, int alpha) {
+      seen.insert(seen.end(), p, p + 3);
+      if (alpha < 0) return;
+      const bool hidden = alpha == 0 && std::string(output) == "cutout";
+      EXPECT_TRUE(hidden || alpha == Stream::alpha_at(x)) << alpha << " at " << x;
+    });
+  return seen;
+}
+
+class Formats : public testing::TestWithParam<const char*> {};
+
+TEST_P(Formats, AllGiveTheSamePicturesAtAnyWidthAndStride) {
+  for (const auto& [width, height] : {std::pair{40, 24}, {33, 7}, {1, 1}, {3, 1}, {1, 5}}) {
+    const auto expected = run_clip(GetParam(), GST_VIDEO_FORMAT_RGB, width, height, false);
+    ASSERT_EQ(static_cast<size_t>(8 * 3 * width * height), expected.size());
+    for (GstVideoFormat format : kFormats)
+      for (bool padded : {false, true})
+        EXPECT_EQ(expected, run_clip(GetParam(), format, width, height, padded))
+            << gst_video_format_to_string(format) << " " << width << "x" << height
+            << (padded ? " padded" : "");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Outputs, Formats,
+                         testing::Values("background", "foreground", "mask", "cutout"));
+
+TEST(Outputs, BackgroundPlusForegroundExplainsTheFrame) {
+  const auto background = run_clip("background", GST_VIDEO_FORMAT_RGB, 40, 24, false);
+  const auto foreground = run_clip("foreground", GST_VIDEO_FORMAT_RGB, 40, 24, false);
+  ASSERT_EQ(background.size(), foreground.size());
+  size_t i = 0;
+  for (int t = 0; t < 8; ++t)
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 40; ++x) {
+        uint8_t rgb[3];
+        paint_mover(t, x, y, rgb);
+        for (int c = 0; c < 3; ++c, ++i) ASSERT_EQ(std::abs(rgb[c] - background[i]), foreground[i]);
+      }
+}
+
+TEST(Outputs, CutoutIsTransparentOutsideTheMask) {
+  Stream stream("qdmdbackground window-size=8 output=cutout", GST_VIDEO_FORMAT_BGRA, 40, 24);
+  stream.push_many(0, 8);
+  int shown = 0, hidden = 0;
+  for (const auto& buffer : stream.take_all())
+    stream.each_pixel(buffer.get(), [&](int, int, const uint8_t* p, int alpha) {
+      if (alpha == 0) {
+        ++hidden;
+        EXPECT_EQ(0, p[0] + p[1] + p[2]);
+      } else {
+        ++shown;
+      }
+    });
+  EXPECT_GT(shown, 0);
+  EXPECT_GT(hidden, shown);
+}
+
+TEST(Outputs, ChangeWhilePlaying) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
+  stream.push_many(0, 5);
+  stream.take_all();
+  gst_harness_set(stream.harness(), "qdmdbackground", "output", 2, nullptr);
+  stream.push_many(5, 5);
+  for (const auto& buffer : stream.take_all())
+    stream.each_pixel(buffer.get(), [](int, int, const uint8_t* p, int) {
+      ASSERT_TRUE(p[0] == 0 || p[0] == 255);
+    });
+}
+
+TEST(Latency, IsTheWindowLessOneFrame) {
+  Stream stream("qdmdbackground window-size=25", GST_VIDEO_FORMAT_RGB, 8, 8, 50, 1);
+  gst_harness_set_upstream_latency(stream.harness(), 10 * GST_MSECOND);
+  stream.push(0);
+  EXPECT_EQ(10 * GST_MSECOND + 24 * GST_SECOND / 50, gst_harness_query_latency(stream.harness()));
+}
+
+TEST(Latency, WithoutARateIsThatOf25FramesPerSecond) {
+  Stream stream("qdmdbackground window-size=26", GST_VIDEO_FORMAT_RGB, 8, 8, 0, 1);
+  stream.push(0);
+  EXPECT_EQ(GST_SECOND, gst_harness_query_latency(stream.harness()));
+}
+
+TEST(Latency, OddRatesAreExact) {
+  Stream stream("qdmdbackground window-size=31", GST_VIDEO_FORMAT_RGB, 8, 8, 30000, 1001);
+  stream.push(0);
+  EXPECT_EQ(GstClockTime{1001} * GST_MSECOND, gst_harness_query_latency(stream.harness()));
+}
+
+// What a pipeline says on its bus first: the error's text, or "" for EOS.
+std::string first_word(const std::string& launch, GQuark* domain, int* code) {
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), nullptr);
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstBus* bus = gst_element_get_bus(pipeline);
+  GstMessage* message = gst_bus_timed_pop_filtered(
+      bus, 60 * GST_SECOND, GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  std::string text = "nothing";
+  if (message && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS) text = "";
+  if (message && GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR) {
+    GError* error = nullptr;
+    gst_message_parse_error(message, &error, nullptr);
+    text = error->message;
+    *domain = error->domain;
+    *code = error->code;
+    g_error_free(error);
+  }
+  if (message) gst_message_unref(message);
+  gst_object_unref(bus);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(pipeline);
+  return text;
+}
+
+TEST(Limits, TooLargeAWindowIsAnErrorThatSaysWhatToChange) {
+  GQuark domain = 0;
+  int code = 0;
+  const std::string text = first_word(
+      "videotestsrc num-buffers=2 ! video/x-raw,format=RGB,width=4096,height=2160 ! "
+      "qdmdbackground window-size=200 max-memory=100000000 ! fakesink",
+      &domain, &code);
+  EXPECT_EQ(GST_RESOURCE_ERROR, domain);
+  EXPECT_EQ(GST_RESOURCE_ERROR_NO_SPACE_LEFT, code);
+  EXPECT_NE(std::string::npos, text.find("window-size")) << text;
+  EXPECT_NE(std::string::npos, text.find(std::to_string(3ull * 200 * 4096 * 2160))) << text;
+}
+
+TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {
+  GQuark domain = 0;
+  int code = 0;
+  const std::string text = first_word(
+      "videotestsrc num-buffers=2 ! video/x-raw,format=RGB,width=1920,height=1080 ! "
+      "qdmdbackground window-size=100 solver=adjoint ! fakesink",
+      &domain, &code);
+  EXPECT_EQ(GST_RESOURCE_ERROR, domain);
+  EXPECT_NE(std::string::npos, text.find("solver=gram")) << text;
+}
+
+TEST(Pipelines, ALiveSourceEndsWithoutDroppingFrames) {
+  GQuark domain = 0;
+  int code = 0;
+  EXPECT_EQ("", first_word("videotestsrc is-live=true num-buffers=30 ! "
+                           "video/x-raw,format=RGB,width=64,height=48,framerate=50/1 ! "
+                           "qdmdbackground window-size=8 ! fakesink sync=true",
+                           &domain, &code));
+}
+
+TEST(States, WalkUpAndDown) {
+  GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
+  ASSERT_NE(nullptr, element);
+  for (GstState state :
+       {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED, GST_STATE_READY,
+        GST_STATE_PAUSED, GST_STATE_READY, GST_STATE_NULL, GST_STATE_PLAYING, GST_STATE_NULL})
+    EXPECT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, state));
+  gst_object_unref(element);
+}
+
+TEST(States, ReadyForgetsTheWindow) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 8, 8);
+  stream.push_many(0, 4);
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  ASSERT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, GST_STATE_READY));
+  ASSERT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, GST_STATE_PLAYING));
+  GstStructure* stats = nullptr;
+  g_object_get(element, "stats", &stats, nullptr);
+  guint64 frames_in = 99;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, "frames-in", &frames_in));
+  EXPECT_EQ(0u, frames_in);
+  gst_structure_free(stats);
+  gst_object_unref(element);
+}
+
+TEST(Properties, EveryOneIsReadBackAndDocumented) {
+  GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
+  gst_util_set_object_arg(G_OBJECT(element), "output", "cutout");
+  gst_util_set_object_arg(G_OBJECT(element), "window-size", "33");
+  gst_util_set_object_arg(G_OBJECT(element), "method", "dmd");
+  gst_util_set_object_arg(G_OBJECT(element), "rank", "3");
+  gst_util_set_object_arg(G_OBJECT(element), "omega-threshold", "0.25");
+  gst_util_set_object_arg(G_OBJECT(element), "amplitude", "first-frame");
+  gst_util_set_object_arg(G_OBJECT(element), "solver", "adjoint");
+  gst_util_set_object_arg(G_OBJECT(element), "foreground-threshold", "12.5");
+  gst_util_set_object_arg(G_OBJECT(element), "max-memory", "5000000000");
+  gint output, method, amplitude, solver, mode;
+  guint window, rank;
+  gdouble omega, threshold;
+  guint64 memory;
+  g_object_get(element, "output", &output, "method", &method, "amplitude", &amplitude, "solver",
+               &solver, "mode", &mode, "window-size", &window, "rank", &rank, "omega-threshold",
+               &omega, "foreground-threshold", &threshold, "max-memory", &memory, nullptr);
+  EXPECT_EQ(3, output);
+  EXPECT_EQ(1, method);
+  EXPECT_EQ(1, amplitude);
+  EXPECT_EQ(1, solver);
+  EXPECT_EQ(0, mode);
+  EXPECT_EQ(33u, window);
+  EXPECT_EQ(3u, rank);
+  EXPECT_EQ(0.25, omega);
+  EXPECT_EQ(12.5, threshold);
+  EXPECT_EQ(5000000000u, memory);
+
+  guint count = 0;
+  GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element), &count);
+  for (guint i = 0; i < count; ++i) {
+    if (specs[i]->owner_type != G_OBJECT_TYPE(element)) continue;
+    EXPECT_GT(std::strlen(g_param_spec_get_blurb(specs[i])), 20u) << specs[i]->name;
+    if (!(specs[i]->flags & G_PARAM_WRITABLE)) continue;
+    EXPECT_TRUE(specs[i]->flags & (GST_PARAM_MUTABLE_READY | GST_PARAM_MUTABLE_PLAYING))
+        << specs[i]->name;
+  }
+  g_free(specs);
+  gst_object_unref(element);
+}
+
+TEST(Stats, CountFramesAndSolves) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
+  stream.push_many(0, 12);
+  ASSERT_TRUE(stream.eos());
+  stream.take_all();
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  GstStructure* stats = nullptr;
+  g_object_get(element, "stats", &stats, nullptr);
+  guint64 in = 0, out = 0, solves = 0;
+  EXPECT_TRUE(gst_structure_get(stats, "frames-in", G_TYPE_UINT64, &in, "frames-out", G_TYPE_UINT64,
+                                &out, "solves", G_TYPE_UINT64, &solves, nullptr));
+  EXPECT_EQ(12u, in);
+  EXPECT_EQ(12u, out);
+  EXPECT_EQ(3u, solves);
+  gst_structure_free(stats);
+  gst_object_unref(element);
+}
+
+}  // namespace
+}  // namespace qdmd::test

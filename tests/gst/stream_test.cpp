@@ -1,0 +1,205 @@
+// Frames in and frames out: counts, order, timestamps, flags, metadata, events.
+#include "tests/gst/element_test.h"
+
+namespace qdmd::test {
+namespace {
+
+void expect_frames(const std::vector<BufferPtr>& out, int first, int count) {
+  ASSERT_EQ(static_cast<size_t>(count), out.size());
+  for (int i = 0; i < count; ++i) {
+    const GstBuffer* buffer = out[static_cast<size_t>(i)].get();
+    EXPECT_EQ(static_cast<GstClockTime>(first + i) * kFrame, GST_BUFFER_PTS(buffer));
+    EXPECT_EQ(kFrame, GST_BUFFER_DURATION(buffer));
+    EXPECT_EQ(static_cast<guint64>(first + i), GST_BUFFER_OFFSET(buffer));
+  }
+}
+
+class FrameCount : public testing::TestWithParam<int> {};
+
+TEST_P(FrameCount, AllComeOutInOrderWithTheirTimestamps) {
+  Stream stream("qdmdbackground window-size=20", GST_VIDEO_FORMAT_RGB, 40, 24);
+  const int count = GetParam();
+  stream.push_many(0, count);
+  const auto before = stream.take_all();
+  expect_frames(before, 0, count / 20 * 20);
+  EXPECT_TRUE(stream.eos());
+  expect_frames(stream.take_all(), count / 20 * 20, count % 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(AroundTheWindow, FrameCount, testing::Values(1, 2, 7, 19, 20, 21, 47, 60));
+
+TEST(Content, EachOutputBelongsToItsOwnFrame) {
+  // With the background removed, what stays of each frame is its own square.
+  for (int count : {20, 33}) {
+    Stream stream("qdmdbackground window-size=20 output=mask", GST_VIDEO_FORMAT_RGB, 40, 24);
+    stream.push_many(0, count);
+    ASSERT_TRUE(stream.eos());
+    const auto out = stream.take_all();
+    ASSERT_EQ(static_cast<size_t>(count), out.size());
+    for (int t = 0; t < count; ++t) {
+      const int left = (3 * t) % 32;
+      int inside = 0;
+      stream.each_pixel(out[static_cast<size_t>(t)].get(),
+                        [&](int x, int y, const uint8_t* p, int) {
+                          EXPECT_TRUE((p[0] == 0 || p[0] == 255) && p[1] == p[0] && p[2] == p[0]);
+                          if (x >= left && x < left + 4 && y >= 4 && y < 9) inside += p[0] == 255;
+                        });
+      EXPECT_EQ(20, inside) << "frame " << t << " of " << count;
+    }
+  }
+}
+
+TEST(Content, StillWindowsGiveTheirFrameBack) {
+  const Painter black = [](int, int, int, uint8_t* p) { p[0] = p[1] = p[2] = 0; };
+  const Painter white = [](int, int, int, uint8_t* p) { p[0] = p[1] = p[2] = 255; };
+  for (const char* options : {"", "method=dmd", "solver=adjoint", "amplitude=first-frame",
+                              "method=dmd amplitude=first-frame", "rank=1"})
+    for (const Painter& paint : {Painter(paint_still), black, white})
+      for (int width : {1, 13})
+        for (int count : {1, 2, 9}) {
+          Stream stream(std::string("qdmdbackground window-size=5 ") + options,
+                        GST_VIDEO_FORMAT_RGB, width, width);
+          stream.push_many(0, count, paint);
+          ASSERT_TRUE(stream.eos());
+          const auto out = stream.take_all();
+          ASSERT_EQ(static_cast<size_t>(count), out.size());
+          for (const auto& buffer : out)
+            stream.each_pixel(buffer.get(), [&](int x, int y, const uint8_t* p, int) {
+              uint8_t expected[3];
+              paint(0, x, y, expected);
+              ASSERT_EQ(0, std::memcmp(expected, p, 3)) << options << " at " << x << ", " << y;
+            });
+        }
+}
+
+TEST(Content, InputBuffersStayAsTheyWere) {
+  Stream stream("qdmdbackground window-size=3 output=cutout", GST_VIDEO_FORMAT_RGBA, 17, 9);
+  std::vector<BufferPtr> kept;
+  for (int t = 0; t < 6; ++t) {
+    kept.push_back(stream.make_frame(t, paint_mover));
+    // A second reference makes the buffer read-only.
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), gst_buffer_ref(kept.back().get())));
+  }
+  for (int t = 0; t < 6; ++t) {
+    const auto again = stream.make_frame(t, paint_mover);
+    GstMapInfo map;
+    ASSERT_TRUE(gst_buffer_map(again.get(), &map, GST_MAP_READ));
+    EXPECT_EQ(0, gst_buffer_memcmp(kept[static_cast<size_t>(t)].get(), 0, map.data, map.size));
+    gst_buffer_unmap(again.get(), &map);
+  }
+}
+
+TEST(Flags, OnlyTheFirstFrameIsDiscont) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 8, 8);
+  stream.push_many(0, 12);
+  ASSERT_TRUE(stream.eos());
+  const auto out = stream.take_all();
+  ASSERT_EQ(12u, out.size());
+  for (size_t i = 1; i < out.size(); ++i) EXPECT_FALSE(GST_BUFFER_IS_DISCONT(out[i].get())) << i;
+}
+
+TEST(Flags, EachFrameKeepsItsOwn) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 8, 8);
+  for (int t = 0; t < 5; ++t) {
+    auto buffer = stream.make_frame(t, paint_mover);
+    if (t == 3) GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_MARKER);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  }
+  const auto out = stream.take_all();
+  ASSERT_EQ(5u, out.size());
+  for (size_t t = 0; t < 5; ++t)
+    EXPECT_EQ(t == 3, GST_BUFFER_FLAG_IS_SET(out[t].get(), GST_BUFFER_FLAG_MARKER)) << t;
+}
+
+TEST(Flags, DiscontEndsTheWindowBeforeIt) {
+  Stream stream("qdmdbackground window-size=10", GST_VIDEO_FORMAT_RGB, 8, 8);
+  stream.push_many(0, 4);
+  EXPECT_TRUE(stream.take_all().empty());
+  auto buffer = stream.make_frame(100, paint_mover);
+  GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  expect_frames(stream.take_all(), 0, 4);
+  stream.push_many(101, 9);
+  const auto out = stream.take_all();
+  expect_frames(out, 100, 10);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(out[0].get()));
+}
+
+TEST(Metadata, RegionsOfInterestStayWithTheirFrame) {
+  Stream stream("qdmdbackground window-size=4", GST_VIDEO_FORMAT_RGB, 16, 16);
+  for (int t = 0; t < 4; ++t) {
+    auto buffer = stream.make_frame(t, paint_mover);
+    gst_buffer_add_video_region_of_interest_meta(buffer.get(), "face", static_cast<guint>(t), 2, 3,
+                                                 4);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  }
+  const auto out = stream.take_all();
+  ASSERT_EQ(4u, out.size());
+  for (guint t = 0; t < 4; ++t) {
+    const auto* meta = reinterpret_cast<GstVideoRegionOfInterestMeta*>(
+        gst_buffer_get_meta(out[t].get(), GST_VIDEO_REGION_OF_INTEREST_META_API_TYPE));
+    ASSERT_NE(nullptr, meta) << t;
+    EXPECT_EQ(t, meta->x);
+  }
+}
+
+TEST(Events, GapDoesNotOvertakeFrames) {
+  Stream stream("qdmdbackground window-size=10", GST_VIDEO_FORMAT_RGB, 8, 8);
+  stream.push_many(0, 3);
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_gap(3 * kFrame, kFrame)));
+  expect_frames(stream.take_all(), 0, 3);
+}
+
+TEST(Events, CapsChangeSendsTheOldFramesFirst) {
+  Stream stream("qdmdbackground window-size=10", GST_VIDEO_FORMAT_RGB, 24, 16);
+  stream.push_many(0, 14);
+  const auto old_size = stream.info().size;
+  stream.set_caps(GST_VIDEO_FORMAT_BGRA, 31, 9);
+  stream.push_many(14, 11);
+  ASSERT_TRUE(stream.eos());
+  const auto out = stream.take_all();
+  expect_frames(out, 0, 25);
+  for (size_t i = 0; i < out.size(); ++i)
+    EXPECT_EQ(i < 14 ? old_size : stream.info().size, gst_buffer_get_size(out[i].get())) << i;
+}
+
+TEST(Events, EqualCapsDoNotEndTheWindow) {
+  Stream stream("qdmdbackground window-size=10", GST_VIDEO_FORMAT_RGB, 24, 16);
+  stream.push_many(0, 6);
+  ASSERT_TRUE(gst_harness_push_event(
+      stream.harness(),
+      gst_event_new_caps(
+          std::unique_ptr<GstCaps, decltype(&gst_caps_unref)>(
+              gst_video_info_to_caps(const_cast<GstVideoInfo*>(&stream.info())), gst_caps_unref)
+              .get())));
+  EXPECT_TRUE(stream.take_all().empty());
+  stream.push_many(6, 4);
+  expect_frames(stream.take_all(), 0, 10);
+}
+
+TEST(Events, FlushDropsTheWindow) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 8, 8);
+  stream.push_many(0, 4);
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_flush_start()));
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_flush_stop(TRUE)));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_segment(&segment)));
+  EXPECT_TRUE(stream.take_all().empty());
+  stream.push_many(50, 5);
+  expect_frames(stream.take_all(), 50, 5);
+}
+
+TEST(Events, QosDoesNotThinFrames) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 8, 8);
+  for (int t = 0; t < 20; ++t) {
+    ASSERT_EQ(GST_FLOW_OK, stream.push(t));
+    gst_harness_push_upstream_event(
+        stream.harness(),
+        gst_event_new_qos(GST_QOS_TYPE_UNDERFLOW, 9.0, GST_SECOND, 100 * GST_SECOND));
+  }
+  expect_frames(stream.take_all(), 0, 20);
+}
+
+}  // namespace
+}  // namespace qdmd::test
