@@ -10,6 +10,10 @@
 namespace qdmd {
 namespace {
 
+// Frames that enter the Gram matrix together: few enough that little is left to do when a window is
+// full, enough that the window is not read from memory for every frame.
+constexpr int kGramGroup = 4;
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -81,9 +85,7 @@ Status Engine::push(const ImageView& frame) {
   const int slot = window_.append();
   for (int c = 0; c < kChannels; ++c) copy_plane(frame.channel[c], frame, window_.plane(slot, c));
   alpha_.set(slot, frame);
-  const auto start = std::chrono::steady_clock::now();
-  gram_.add_newest(window_);
-  gram_seconds_ += seconds_since(start);
+  if (++not_in_gram_ == std::min(kGramGroup, options_.window_size)) update_gram();
   if (++pending_ == options_.window_size) solve();
   return {};
 }
@@ -100,10 +102,19 @@ void Engine::flush() {
   window_.clear();
   pending_ = ready_ = 0;
   start_new_window_ = false;
+  not_in_gram_ = 0;
   gram_seconds_ = 0;
 }
 
+void Engine::update_gram() {
+  const auto start = std::chrono::steady_clock::now();
+  if (not_in_gram_ > 0) gram_.add_newest(window_, not_in_gram_);
+  not_in_gram_ = 0;
+  gram_seconds_ += seconds_since(start);
+}
+
 void Engine::solve() {
+  update_gram();
   const auto start = std::chrono::steady_clock::now();
   const Decomposition decomposition = decompose(window_, gram_.matrix(window_), options_.dmd);
   report_.solve_time = seconds_since(start);

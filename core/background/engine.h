@@ -73,6 +73,7 @@ class Engine {
   void set_foreground_threshold(double threshold);
 
  private:
+  void update_gram();
   void solve();
 
   EngineOptions options_;
@@ -82,6 +83,7 @@ class Engine {
   AlphaStore alpha_;
   BackgroundModel model_;
   SolveReport report_;
+  int not_in_gram_ = 0;      // newest frames whose inner products are not computed yet
   double gram_seconds_ = 0;  // since the newest solve
   uint64_t solves_ = 0;
   int pending_ = 0;  // the newest `pending_` frames of the window

@@ -1,6 +1,5 @@
 #include "core/gram/gram.h"
 
-#include <array>
 #include <vector>
 
 #include "core/gram/kernel.h"
@@ -10,24 +9,25 @@ namespace qdmd {
 SlidingGram::SlidingGram(int capacity)
     : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)) {}
 
-void SlidingGram::add_newest(const Window& window) {
+void SlidingGram::add_newest(const Window& window, int count) {
   const int size = window.size();
-  const int newest = window.slot(size - 1);
-  std::array<const uint8_t*, kChannels> rows;
-  for (int c = 0; c < kChannels; ++c) rows[static_cast<size_t>(c)] = window.plane(newest, c);
-  std::vector<const uint8_t*> cols;
-  cols.reserve(static_cast<size_t>(size) * kChannels);
+  std::vector<const uint8_t*> planes;
+  planes.reserve(static_cast<size_t>(size) * kChannels);
   for (int t = 0; t < size; ++t)
-    for (int c = 0; c < kChannels; ++c) cols.push_back(window.plane(window.slot(t), c));
+    for (int c = 0; c < kChannels; ++c) planes.push_back(window.plane(window.slot(t), c));
   Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products(
-      kChannels, kChannels * size);
-  dot_products(rows.data(), rows.size(), cols.data(), cols.size(), window.plane_size(),
-               products.data());
-  for (int t = 0; t < size; ++t) {
-    const int slot = window.slot(t);
-    const auto block = products.block<kChannels, kChannels>(0, kChannels * t);
-    by_slot_.block<kChannels, kChannels>(kChannels * newest, kChannels * slot) = block;
-    by_slot_.block<kChannels, kChannels>(kChannels * slot, kChannels * newest) = block.transpose();
+      kChannels * count, kChannels * size);
+  const auto rows = static_cast<size_t>(kChannels * count);
+  dot_products(planes.data() + planes.size() - rows, rows, planes.data(), planes.size(),
+               window.plane_size(), products.data());
+  for (int k = 0; k < count; ++k) {
+    const int added = window.slot(size - count + k);
+    for (int t = 0; t < size; ++t) {
+      const int slot = window.slot(t);
+      const auto block = products.block<kChannels, kChannels>(kChannels * k, kChannels * t);
+      by_slot_.block<kChannels, kChannels>(kChannels * added, kChannels * slot) = block;
+      by_slot_.block<kChannels, kChannels>(kChannels * slot, kChannels * added) = block.transpose();
+    }
   }
 }
 

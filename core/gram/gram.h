@@ -18,9 +18,10 @@ class SlidingGram {
   SlidingGram() = default;
   explicit SlidingGram(int capacity);
 
-  // Computes the inner products of the newest snapshot of `window` with all it holds, 9 m products
-  // per pixel. Call once after each append, when the planes are filled.
-  void add_newest(const Window& window);
+  // Computes the inner products of the newest `count` snapshots of `window` with all it holds, 9 m
+  // products per pixel and snapshot. Every snapshot must be added before it leaves the window.
+  // Several at once read the window from memory once.
+  void add_newest(const Window& window, int count = 1);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const Window& window) const;

@@ -33,9 +33,10 @@ void expect_exact(const Planes& rows, const Planes& cols, size_t length) {
   EXPECT_EQ(out.back(), -12345);
 }
 
-// Around vector widths, around the kernel's block, and several blocks.
-constexpr size_t kLengths[] = {1,  2,   3,   15,   16,   17,   31,   33,    63,    64,
-                               65, 127, 255, 1000, 8191, 8192, 8193, 16384, 16385, 70000};
+// Around vector widths, around blocks of 4096 and 8192 pixels, and several blocks.
+constexpr size_t kLengths[] = {1,    2,    3,    15,   16,    17,    31,    33,
+                               63,   64,   65,   127,  255,   1000,  4095,  4096,
+                               4097, 8191, 8192, 8193, 12289, 16384, 16385, 70000};
 
 TEST(DotProducts, RandomPixels) {
   std::mt19937 rng(61);
@@ -195,6 +196,21 @@ TEST(SlidingGram, ManySlidesEqualAFreshStartBitForBit) {
   append_frame(window, picture);
   sliding.add_newest(window);
   EXPECT_EQ(sliding.matrix(window), naive_gram(static_clip(picture, 1))) << "after clear";
+}
+
+TEST(SlidingGram, SnapshotsAddedInGroups) {
+  std::mt19937 rng(69);
+  constexpr int kCapacity = 7;
+  for (int group : {1, 2, 3, 4, 7}) {
+    Window window(kCapacity, 100);
+    SlidingGram gram(kCapacity);
+    for (int frame = 1; frame <= 6 * group; ++frame) {
+      append_frame(window, random_picture(100, rng));
+      if (frame % group > 0) continue;
+      gram.add_newest(window, group);
+      EXPECT_EQ(gram.matrix(window), gram_of(window)) << group << " at a time, frame " << frame;
+    }
+  }
 }
 
 TEST(SlidingGram, PaddingAddsNothing) {

@@ -1,0 +1,247 @@
+// What the engine writes: the four outputs, any memory layout, alpha.
+#include "tests/core/engine_util.h"
+
+namespace qdmd::test {
+namespace {
+
+// ---- The four outputs ----
+
+// One solve of the same clip for each output.
+struct Outputs {
+  std::vector<std::vector<uint8_t>> background, foreground, mask, cutout;
+  double threshold = 0;
+
+  Outputs(const Clip& clip, const EngineOptions& options) {
+    Strip b(clip.pixels, options), f(clip.pixels, options), m(clip.pixels, options),
+        c(clip.pixels, options);
+    background = b.run(clip, Output::background);
+    foreground = f.run(clip, Output::foreground);
+    mask = m.run(clip, Output::mask);
+    cutout = c.run(clip, Output::cutout);
+    threshold = m.engine.report().foreground.threshold;
+  }
+};
+
+TEST(EngineOutput, FollowsItsDefinition) {
+  std::mt19937 rng(120);
+  const Clip clip = moving_box_clip(300, 12, 40, rng);
+  for (double fixed : {0.0, 25.0, 3.0}) {
+    auto options = window_of(12);
+    options.dmd.rank = 1;
+    options.foreground_threshold = fixed;
+    const Outputs out(clip, options);
+    if (fixed > 0) {
+      EXPECT_EQ(out.threshold, fixed);
+    }
+    size_t white = 0;
+    for (size_t t = 0; t < clip.size(); ++t)
+      for (size_t p = 0; p < clip.pixels; ++p) {
+        int squared = 0;
+        for (size_t c = 0; c < 3; ++c) {
+          const size_t i = c * clip.pixels + p;
+          const int difference = clip.frames[t][i] - out.background[t][i];
+          squared += difference * difference;
+          ASSERT_EQ(out.foreground[t][i], std::abs(difference));
+        }
+        const bool is_foreground = squared > out.threshold * out.threshold;
+        if (is_foreground) ++white;
+        for (size_t c = 0; c < 3; ++c) {
+          const size_t i = c * clip.pixels + p;
+          ASSERT_EQ(out.mask[t][i], is_foreground ? 255 : 0);
+          ASSERT_EQ(out.cutout[t][i], is_foreground ? clip.frames[t][i] : 0);
+        }
+      }
+    EXPECT_GT(white, 0u);
+    EXPECT_LT(white, clip.size() * clip.pixels);
+  }
+}
+
+TEST(EngineOutput, ThresholdTakesEffectAtOnce) {
+  std::mt19937 rng(121);
+  const Clip clip = moving_box_clip(300, 6, 40, rng);
+  auto options = window_of(6);
+  options.dmd.rank = 1;
+  Strip strip(clip.pixels, options);
+  for (const auto& frame : clip.frames) strip.push(frame);
+  const auto white = [&] {
+    const auto mask = strip.pop(Output::mask);
+    return std::count(mask.begin(), mask.end(), uint8_t{255});
+  };
+  const double automatic = strip.engine.report().foreground.threshold;
+  const auto by_noise = white();
+  strip.engine.set_foreground_threshold(500);
+  EXPECT_EQ(strip.engine.report().foreground.threshold, 500);
+  EXPECT_EQ(white(), 0) << "no distance is above 442";
+  strip.engine.set_foreground_threshold(0.5);
+  const auto all = white();
+  EXPECT_GT(all, by_noise);
+  strip.engine.set_foreground_threshold(0);
+  EXPECT_EQ(strip.engine.report().foreground.threshold, automatic);
+  EXPECT_LT(white(), all);
+  strip.engine.set_foreground_threshold(500);
+  strip.pop_all(Output::mask);
+  for (const auto& frame : clip.frames) strip.push(frame);
+  EXPECT_EQ(white(), 0) << "and stays for the next window";
+}
+
+// ---- Layouts and alpha ----
+
+TEST(EngineLayout, PaddingIsNeitherReadNorWritten) {
+  const int width = 7, height = 5;
+  std::mt19937 rng(122);
+  const auto still = random_picture(35, rng);
+  for (auto output : {Output::background, Output::foreground, Output::mask, Output::cutout}) {
+    Engine engine;
+    auto options = window_of(3);
+    options.foreground_threshold = 0.5;
+    ASSERT_TRUE(engine.configure(options, width, height).ok());
+    // RGBx without an alpha view, RGB, and RGBA, every one with another row padding.
+    Picture rgbx(width, height, 4, false, 12), rgb(width, height, 3, false, 3),
+        rgba(width, height, 4, true, 5);
+    for (auto* picture : {&rgbx, &rgb, &rgba}) {
+      picture->fill(still);
+      ASSERT_TRUE(engine.push(picture->in()).ok());
+    }
+    for (auto [bytes_per_pixel, with_alpha, padding] :
+         {std::tuple(4, false, 12), std::tuple(3, false, 3), std::tuple(4, true, 5)}) {
+      Picture out(width, height, bytes_per_pixel, with_alpha, padding);
+      engine.pop(output, out.out());
+      EXPECT_EQ(out.planes(), output == Output::background ? still : std::vector<uint8_t>(105, 0));
+      for (int row = 0; row < height; ++row)
+        for (ptrdiff_t i = 0; i < out.row_stride; ++i) {
+          const bool in_row = i < width * bytes_per_pixel;
+          const bool alpha_byte = bytes_per_pixel == 4 && i % 4 == 3;
+          if (!in_row || (alpha_byte && !with_alpha)) {
+            ASSERT_EQ(out.bytes[static_cast<size_t>(row * out.row_stride + i)], kUntouched);
+          }
+        }
+    }
+  }
+}
+
+TEST(EngineLayout, PlanarAndBottomUp) {
+  const int width = 4, height = 3;
+  std::mt19937 rng(123);
+  const auto still = random_picture(12, rng);
+  Engine engine;
+  ASSERT_TRUE(engine.configure(window_of(2), width, height).ok());
+  ImageView planar;
+  for (int c = 0; c < 3; ++c) planar.channel[c] = still.data() + 12 * c;
+  planar.width = width, planar.height = height, planar.pixel_stride = 1, planar.row_stride = width;
+  engine.push(planar);
+  engine.push(planar);
+  std::vector<uint8_t> bytes(36);
+  MutableImageView flipped;
+  for (int c = 0; c < 3; ++c) flipped.channel[c] = bytes.data() + 12 * c + 8;
+  flipped.width = width, flipped.height = height, flipped.pixel_stride = 1;
+  flipped.row_stride = -width;
+  engine.pop(Output::background, flipped);
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t p = 0; p < 12; ++p)
+      EXPECT_EQ(bytes[12 * c + (2 - p / 4) * 4 + p % 4], still[12 * c + p]);
+}
+
+// Frame t has alpha 10 t + 1 everywhere, or a ramp from there where `varies`.
+uint8_t alpha_of(int t, size_t pixel, bool varies) {
+  return static_cast<uint8_t>(10 * t + 1 + (varies ? static_cast<int>(pixel) : 0));
+}
+
+TEST(EngineAlpha, PassesThroughWithItsOwnFrame) {
+  const int width = 6, height = 4, count = 5;
+  std::mt19937 rng(124);
+  for (auto output : {Output::background, Output::foreground, Output::mask}) {
+    Engine engine;
+    ASSERT_TRUE(engine.configure(window_of(3), width, height).ok());
+    int popped = 0;
+    const auto take = [&] {
+      while (engine.ready()) {
+        Picture out(width, height, 4, true, 2);
+        engine.pop(output, out.out());
+        for (size_t p = 0; p < out.pixels(); ++p)
+          ASSERT_EQ(out.at(3, p), alpha_of(popped, p, popped % 2 == 1)) << popped;
+        ++popped;
+      }
+    };
+    // Five frames over windows of three: slots change between constant and varying.
+    for (int t = 0; t < count; ++t) {
+      Picture in(width, height, 4, true);
+      in.fill(random_picture(24, rng));
+      for (size_t p = 0; p < in.pixels(); ++p) in.at(3, p) = alpha_of(t, p, t % 2 == 1);
+      ASSERT_TRUE(engine.push(in.in()).ok());
+      take();
+    }
+    engine.drain();
+    take();
+    EXPECT_EQ(popped, count);
+  }
+}
+
+TEST(EngineAlpha, PaddingIsOpaque) {
+  std::mt19937 rng(125);
+  for (auto output : {Output::background, Output::foreground, Output::mask, Output::cutout}) {
+    Engine engine;
+    ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
+    Picture padded(3, 3, 4, true), plain(3, 3, 3);
+    padded.fill(random_picture(9, rng));
+    plain.fill(random_picture(9, rng));
+    auto in = padded.in();
+    in.alpha_is_padding = true;
+    engine.push(in);
+    engine.push(plain.in());
+    Picture out(3, 3, 4, true);
+    auto view = out.out();
+    view.alpha_is_padding = true;
+    engine.pop(output, view);
+    for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
+    if (output == Output::cutout) continue;
+    // A frame without alpha is opaque in an output that has it.
+    engine.pop(output, out.out());
+    for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
+  }
+}
+
+TEST(EngineAlpha, InputPaddingIsNotTakenForAlpha) {
+  Engine engine;
+  ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
+  Picture padded(3, 3, 4, true);  // 0xA5 in all bytes
+  auto in = padded.in();
+  in.alpha_is_padding = true;
+  engine.push(in);
+  engine.push(in);
+  Picture out(3, 3, 4, true);
+  engine.pop(Output::background, out.out());
+  for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
+}
+
+TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
+  std::mt19937 rng(126);
+  const size_t pixels = 200, count = 8;
+  const Clip clip = moving_box_clip(pixels, count, 30, rng);
+  auto options = window_of(static_cast<int>(count));
+  options.dmd.rank = 1;
+  options.foreground_threshold = 40;
+  const Outputs reference(clip, options);
+  for (bool varies : {false, true}) {
+    Engine engine;
+    ASSERT_TRUE(engine.configure(options, static_cast<int>(pixels), 1).ok());
+    for (size_t t = 0; t < count; ++t) {
+      Picture in(static_cast<int>(pixels), 1, 4, true);
+      in.fill(clip.frames[t]);
+      for (size_t p = 0; p < pixels; ++p)
+        in.at(3, p) = static_cast<uint8_t>(varies ? 20 + p : 77 + t);
+      ASSERT_TRUE(engine.push(in.in()).ok());
+    }
+    for (size_t t = 0; t < count; ++t) {
+      Picture out(static_cast<int>(pixels), 1, 4, true);
+      engine.pop(Output::cutout, out.out());
+      EXPECT_EQ(out.planes(), reference.cutout[t]);
+      for (size_t p = 0; p < pixels; ++p) {
+        const auto own = static_cast<uint8_t>(varies ? 20 + p : 77 + t);
+        ASSERT_EQ(out.at(3, p), reference.mask[t][p] ? own : 0);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test

@@ -1,0 +1,107 @@
+// An engine fed from clips, and packed pictures with strides, padding and alpha.
+#pragma once
+
+#include "core/background/engine.h"
+#include "tests/core/test_util.h"
+
+namespace qdmd::test {
+
+inline constexpr uint8_t kUntouched = 0xA5;
+
+// A packed picture of its own. bytes_per_pixel 4 has alpha at offset 3 when `with_alpha`.
+struct Picture {
+  int width, height, bytes_per_pixel;
+  bool with_alpha;
+  ptrdiff_t row_stride;
+  std::vector<uint8_t> bytes;
+
+  Picture(int width_, int height_, int bytes_per_pixel_ = 4, bool with_alpha_ = false,
+          int padding = 0)
+      : width(width_),
+        height(height_),
+        bytes_per_pixel(bytes_per_pixel_),
+        with_alpha(with_alpha_),
+        row_stride(width_ * bytes_per_pixel_ + padding),
+        bytes(static_cast<size_t>(row_stride * height_), kUntouched) {}
+
+  uint8_t& at(size_t channel, size_t pixel) {
+    const size_t row = pixel / static_cast<size_t>(width), col = pixel % static_cast<size_t>(width);
+    return bytes[row * static_cast<size_t>(row_stride) +
+                 col * static_cast<size_t>(bytes_per_pixel) + channel];
+  }
+  size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
+
+  template <typename Byte>
+  BasicImageView<Byte> view() {
+    BasicImageView<Byte> view;
+    for (int c = 0; c < 3; ++c) view.channel[c] = bytes.data() + c;
+    if (with_alpha) view.alpha = bytes.data() + 3;
+    view.width = width;
+    view.height = height;
+    view.pixel_stride = bytes_per_pixel;
+    view.row_stride = row_stride;
+    return view;
+  }
+  ImageView in() { return view<const uint8_t>(); }
+  MutableImageView out() { return view<uint8_t>(); }
+
+  void fill(const std::vector<uint8_t>& planes) {
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t p = 0; p < pixels(); ++p) at(c, p) = planes[c * pixels() + p];
+  }
+  std::vector<uint8_t> planes() {
+    std::vector<uint8_t> planes(3 * pixels());
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t p = 0; p < pixels(); ++p) planes[c * pixels() + p] = at(c, p);
+    return planes;
+  }
+};
+
+// An engine for pictures of width x 1.
+struct Strip {
+  int width;
+  Engine engine;
+
+  Strip(size_t pixels, const EngineOptions& options) : width(static_cast<int>(pixels)) {
+    const Status status = engine.configure(options, width, 1);
+    EXPECT_TRUE(status.ok()) << status.message;
+  }
+  Status push(const std::vector<uint8_t>& planes) {
+    Picture picture(width, 1);
+    picture.fill(planes);
+    return engine.push(picture.in());
+  }
+  std::vector<uint8_t> pop(Output output) {
+    Picture picture(width, 1);
+    engine.pop(output, picture.out());
+    return picture.planes();
+  }
+  // Pops all that is ready.
+  std::vector<std::vector<uint8_t>> pop_all(Output output) {
+    std::vector<std::vector<uint8_t>> all;
+    while (engine.ready()) all.push_back(pop(output));
+    return all;
+  }
+  // The whole stream, drained at its end.
+  std::vector<std::vector<uint8_t>> run(const Clip& clip, Output output) {
+    std::vector<std::vector<uint8_t>> all;
+    const auto take = [&] {
+      for (auto& picture : pop_all(output)) all.push_back(std::move(picture));
+    };
+    for (const auto& frame : clip.frames) {
+      EXPECT_TRUE(push(frame).ok());
+      take();
+    }
+    EXPECT_TRUE(engine.drain().ok());
+    take();
+    return all;
+  }
+};
+
+inline EngineOptions window_of(int size) {
+  EngineOptions options;
+  options.window_size = size;
+  return options;
+}
+
+}  // namespace qdmd::test
