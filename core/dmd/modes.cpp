@@ -22,8 +22,9 @@ std::vector<Eigen::Index> select_background(const Eigen::VectorXcd& eigenvalues,
   std::stable_sort(order.begin(), order.end(), [&](Eigen::Index l, Eigen::Index r) {
     return omega_magnitude(eigenvalues(l)) < omega_magnitude(eigenvalues(r));
   });
+  // Threshold 0 asks for one mode, even where several are exactly static.
   size_t count = 0;
-  while (count < order.size() && omega_magnitude(eigenvalues(order[count])) <= threshold) ++count;
+  while (threshold > 0 && count < order.size() && omega_magnitude(eigenvalues(order[count])) <= threshold) ++count;
   order.resize(std::min(order.size(), std::max<size_t>(count, 1)));
   return order;
 }

@@ -200,6 +200,26 @@ TEST(EngineAlpha, PaddingIsOpaque) {
   }
 }
 
+TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
+  std::mt19937 rng(128);
+  Engine engine;
+  ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
+  Picture with_alpha(3, 3, 4, true), plain(3, 3, 3);
+  with_alpha.fill(random_picture(9, rng));
+  plain.fill(random_picture(9, rng));
+  for (size_t p = 0; p < 9; ++p) with_alpha.at(3, p) = alpha_of(0, p, true);
+  Picture out(3, 3, 4, true);
+  for (auto* picture : {&with_alpha, &plain}) {
+    engine.push(picture->in());
+    engine.push(picture->in());
+    while (engine.ready()) {
+      engine.pop(Output::background, out.out());
+      for (size_t p = 0; p < 9; ++p)
+        EXPECT_EQ(out.at(3, p), picture == &plain ? 255 : alpha_of(0, p, true));
+    }
+  }
+}
+
 TEST(EngineAlpha, InputPaddingIsNotTakenForAlpha) {
   Engine engine;
   ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());

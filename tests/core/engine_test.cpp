@@ -1,6 +1,7 @@
 // The engine from the outside: frames in, pictures out.
 #include <functional>
 
+#include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
 #include "tests/core/engine_util.h"
 
@@ -245,6 +246,31 @@ TEST(EngineBackground, UniformWindowsComeBackExactly) {
             for (const auto& level : out) ASSERT_EQ(level, picture);
             EXPECT_EQ(strip.engine.report().foreground.ratio, 0);
           }
+}
+
+TEST(EngineBackground, IsTheDecompositionOfItsWindow) {
+  std::mt19937 rng(127);
+  for (int size : {2, 3, 4, 5, 7, 9}) {
+    const auto frames = static_cast<size_t>(size);
+    const Clip clip = noisy_clip(90, 3 * frames, 10, rng);
+    Strip strip(clip.pixels, window_of(size));
+    const auto out = strip.run(clip, Output::background);
+    for (size_t first = 0; first < clip.size(); first += frames) {
+      Clip part(clip.pixels, frames);
+      std::copy_n(clip.frames.begin() + static_cast<ptrdiff_t>(first), frames, part.frames.begin());
+      const Window window = to_window(part);
+      BackgroundModel model;
+      model.build(window, decompose(window, gram_of(window), {}).background);
+      for (size_t t = 0; t < frames; ++t) {
+        std::vector<uint8_t> expected(3 * clip.pixels);
+        uint8_t* const planes[3] = {expected.data(), expected.data() + clip.pixels,
+                                    expected.data() + 2 * clip.pixels};
+        model.set_time(static_cast<double>(t));
+        model.evaluate(0, clip.pixels, planes);
+        EXPECT_EQ(out[first + t], expected) << "window-size " << size << ", frame " << first + t;
+      }
+    }
+  }
 }
 
 TEST(EngineBackground, AMovingBoxIsForegroundOnAStillPicture) {
