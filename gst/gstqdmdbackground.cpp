@@ -37,6 +37,7 @@
 #include <new>
 
 #include "core/background/engine.h"
+#include "gst/gstqdmdenums.h"
 #include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
@@ -55,11 +56,9 @@ constexpr int kAssumedRate = 25;
 
 #define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
 
-enum Mode { MODE_BATCH };
-
 struct Settings {
   Output output = Output::background;
-  Mode mode = MODE_BATCH;
+  GstQdmdBackgroundMode mode = GST_QDMD_BACKGROUND_MODE_BATCH;
   EngineOptions engine;
 };
 
@@ -113,59 +112,6 @@ enum {
   PROP_STATS
 };
 
-static GType gst_qdmd_background_output_get_type() {
-  static const GEnumValue values[] = {
-      {int(Output::background), "The background L(t) at the frame's time", "background"},
-      {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
-      {int(Output::mask), "White where the residual exceeds the threshold, else black", "mask"},
-      {int(Output::cutout),
-       "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
-      {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static("GstQdmdBackgroundOutput", values);
-  return type;
-}
-
-static GType gst_qdmd_background_mode_get_type() {
-  static const GEnumValue values[] = {
-      {MODE_BATCH,
-       "Fill a window, solve, send its frames, each with its own L(t); a latency of "
-       "window-size - 1 frames",
-       "batch"},
-      {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static("GstQdmdBackgroundMode", values);
-  return type;
-}
-
-static GType gst_qdmd_background_method_get_type() {
-  static const GEnumValue values[] = {
-      {int(qdmd::Method::qdmd), "Quaternion DMD of the coupled colour channels", "qdmd"},
-      {int(qdmd::Method::dmd), "Exact DMD of each colour channel by itself", "dmd"},
-      {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static("GstQdmdBackgroundMethod", values);
-  return type;
-}
-
-static GType gst_qdmd_background_amplitude_get_type() {
-  static const GEnumValue values[] = {
-      {int(qdmd::Amplitude::window), "Fitted to all frames of the window (least squares)",
-       "window"},
-      {int(qdmd::Amplitude::first_frame), "Fitted to the first frame alone, as the paper does",
-       "first-frame"},
-      {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static("GstQdmdBackgroundAmplitude", values);
-  return type;
-}
-
-static GType gst_qdmd_background_solver_get_type() {
-  static const GEnumValue values[] = {
-      {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
-      {int(qdmd::Solver::adjoint),
-       "The paper's procedure, literally, on the pixels (slow, small windows only)", "adjoint"},
-      {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static("GstQdmdBackgroundSolver", values);
-  return type;
-}
-
 static GstStructure* make_stats(const Private* priv) {
   const auto& report = priv->report;
   GstStructure* stats = gst_structure_new(
@@ -201,7 +147,7 @@ static void gst_qdmd_background_set_property(GObject* object, guint id, const GV
       settings.output = Output(g_value_get_enum(value));
       break;
     case PROP_MODE:
-      settings.mode = Mode(g_value_get_enum(value));
+      settings.mode = GstQdmdBackgroundMode(g_value_get_enum(value));
       break;
     case PROP_WINDOW_SIZE:
       settings.engine.window_size = int(g_value_get_uint(value));

@@ -18,21 +18,22 @@ void BackgroundModel::build(const Window& window, const TemporalModel& model) {
     return;
   }
   pictures_.resize(pictures * pixels_);
-  // Doubles inside a run: at full rank the coefficients of nearly parallel frames cancel.
-  std::array<double, kMaxRun> sum;
-  for (size_t first = 0; first < pixels_; first += kMaxRun) {
-    const size_t count = std::min(kMaxRun, pixels_ - first);
+  // A matrix product over short runs of pixels, whose samples fit in the cache as doubles: at full
+  // rank the coefficients of nearly parallel frames cancel, and single precision would show it.
+  constexpr size_t kRun = 256;
+  using RunMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RunMatrix samples = RunMatrix::Zero(basis_.cols(), kRun), levels(basis_.rows(), kRun);
+  for (size_t first = 0; first < pixels_; first += kRun) {
+    const size_t count = std::min(kRun, pixels_ - first);
+    for (int t = 0; t < window.size(); ++t)
+      for (int c = 0; c < kChannels; ++c)
+        std::copy_n(window.plane(window.slot(t), c) + first, count,
+                    samples.row(kChannels * t + c).data());
+    levels.noalias() = basis_ * samples;
     for (size_t k = 0; k < pictures; ++k) {
-      sum.fill(0);
-      for (int t = 0; t < window.size(); ++t)
-        for (int c = 0; c < kChannels; ++c) {
-          const double weight = basis_(static_cast<Eigen::Index>(k), kChannels * t + c);
-          if (weight == 0) continue;
-          const uint8_t* plane = window.plane(window.slot(t), c) + first;
-          for (size_t p = 0; p < count; ++p) sum[p] += weight * plane[p];
-        }
-      float* picture = pictures_.data() + k * pixels_ + first;
-      for (size_t p = 0; p < count; ++p) picture[p] = static_cast<float>(sum[p]);
+      const double* level = levels.row(static_cast<Eigen::Index>(k)).data();
+      std::transform(level, level + count, pictures_.data() + k * pixels_ + first,
+                     [](double v) { return static_cast<float>(v); });
     }
   }
 }

@@ -85,8 +85,11 @@ Status Engine::push(const ImageView& frame) {
   const int slot = window_.append();
   for (int c = 0; c < kChannels; ++c) copy_plane(frame.channel[c], frame, window_.plane(slot, c));
   alpha_.set(slot, frame);
-  if (++not_in_gram_ == std::min(kGramGroup, options_.window_size)) update_gram();
-  if (++pending_ == options_.window_size) solve();
+  ++pending_;
+  // Frames of the window before are left out: they count only if this window ends early.
+  if (++not_in_gram_ == std::min(kGramGroup, options_.window_size))
+    update_gram(not_in_gram_, pending_);
+  if (pending_ == options_.window_size) solve();
   return {};
 }
 
@@ -106,15 +109,18 @@ void Engine::flush() {
   gram_seconds_ = 0;
 }
 
-void Engine::update_gram() {
+void Engine::update_gram(int count, int span) {
   const auto start = std::chrono::steady_clock::now();
-  if (not_in_gram_ > 0) gram_.add_newest(window_, not_in_gram_);
+  gram_.add_newest(window_, count, span);
   not_in_gram_ = 0;
   gram_seconds_ += seconds_since(start);
 }
 
 void Engine::solve() {
-  update_gram();
+  if (pending_ < window_.size())
+    update_gram(pending_, window_.size());
+  else if (not_in_gram_ > 0)
+    update_gram(not_in_gram_, pending_);
   const auto start = std::chrono::steady_clock::now();
   const Decomposition decomposition = decompose(window_, gram_.matrix(window_), options_.dmd);
   report_.solve_time = seconds_since(start);

@@ -73,7 +73,7 @@ class Engine {
   void set_foreground_threshold(double threshold);
 
  private:
-  void update_gram();
+  void update_gram(int count, int span);
   void solve();
 
   EngineOptions options_;

@@ -12,10 +12,6 @@ namespace {
 
 using Index = Eigen::Index;
 
-double gram_tolerance(Index size) {
-  return 4 * static_cast<double>(size) * std::numeric_limits<double>::epsilon();
-}
-
 // Eigenpairs above the tolerance, largest first; at most `limit` where that is positive.
 struct Spectrum {
   Eigen::VectorXd values;

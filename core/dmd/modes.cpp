@@ -24,9 +24,15 @@ std::vector<Eigen::Index> select_background(const Eigen::VectorXcd& eigenvalues,
   });
   // Threshold 0 asks for one mode, even where several are exactly static.
   size_t count = 0;
-  while (threshold > 0 && count < order.size() && omega_magnitude(eigenvalues(order[count])) <= threshold) ++count;
+  while (threshold > 0 && count < order.size() &&
+         omega_magnitude(eigenvalues(order[count])) <= threshold)
+    ++count;
   order.resize(std::min(order.size(), std::max<size_t>(count, 1)));
   return order;
+}
+
+double gram_tolerance(Eigen::Index size) {
+  return 4 * static_cast<double>(size) * std::numeric_limits<double>::epsilon();
 }
 
 double fit_reference_time(std::complex<double> lambda, Eigen::Index snapshots) {
@@ -75,6 +81,27 @@ QuaternionMatrixd fit_window_amplitudes(const Eigen::VectorXcd& eigenvalues,
   b.a = (s.asDiagonal() * b.a).eval();
   b.b = (s.asDiagonal() * b.b).eval();
   return b;
+}
+
+void fit_to_window(BackgroundModes* modes, const QuaternionMatrixd& phi,
+                   const QuaternionMatrixd& x) {
+  for (Eigen::Index p = 0; p < modes->eigenvalues.size(); ++p)
+    modes->reference_times(p) = fit_reference_time(modes->eigenvalues(p), x.cols());
+  const auto phi_h = phi.conjugate_transpose();
+  modes->amplitudes =
+      fit_window_amplitudes(modes->eigenvalues, modes->reference_times, phi_h * phi, phi_h * x);
+}
+
+void describe_nearest(BackgroundModes* modes, const QuaternionMatrixd& q_tilde,
+                      const QuaternionMatrixd& vector) {
+  DmdSummary& summary = modes->summary;
+  summary.background_modes = static_cast<int>(modes->eigenvalues.size());
+  summary.lambda = modes->eigenvalues(0);
+  summary.omega = omega_magnitude(summary.lambda);
+  QuaternionMatrixd scaled = vector;
+  scaled.scale_col(0, Quaterniond(summary.lambda));
+  const double size = q_tilde.norm() * vector.norm();
+  summary.residual = size > 0 ? (q_tilde * vector - scaled).norm() / size : 0;
 }
 
 QuaternionMatrixd first_frame_amplitudes(const QuaternionMatrixd& phi, const QuaternionMatrixd& x) {

@@ -108,11 +108,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
     background.b.col(p) = phi.b.col(k);
   }
   if (options.amplitude == Amplitude::window) {
-    for (Index p = 0; p < modes; ++p)
-      result.reference_times(p) = fit_reference_time(result.eigenvalues(p), m);
-    const auto phi_h = background.conjugate_transpose();
-    result.amplitudes = fit_window_amplitudes(result.eigenvalues, result.reference_times,
-                                              phi_h * background, phi_h * x);
+    fit_to_window(&result, background, x);
   } else {
     const auto b = first_frame_amplitudes(phi, x.col(0));
     result.amplitudes = QuaternionMatrixd(modes, 1);
@@ -120,16 +116,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
       result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   }
 
-  result.summary.background_modes = static_cast<int>(modes);
-  result.summary.lambda = result.eigenvalues(0);
-  result.summary.omega = omega_magnitude(result.summary.lambda);
-  QuaternionMatrixd vector = w.col(chosen[0]);
-  QuaternionMatrixd error = q_tilde * vector;
-  const double vector_size = vector.norm();
-  vector.scale_col(0, Quaterniond(result.summary.lambda));
-  error -= vector;
-  const double size = q_tilde.norm() * vector_size;
-  result.summary.residual = size > 0 ? error.norm() / size : 0;
+  describe_nearest(&result, q_tilde, w.col(chosen[0]));
   return result;
 }
 

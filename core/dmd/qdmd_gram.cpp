@@ -8,11 +8,6 @@
 namespace qdmd {
 namespace {
 
-// Relative error that rounding leaves in the eigenvalues of an exact m x m Gram matrix.
-double gram_tolerance(Eigen::Index size) {
-  return 4 * static_cast<double>(size) * std::numeric_limits<double>::epsilon();
-}
-
 // Columns (k x m, k <= m) with the same inner products as the snapshots: whatever is asked of the
 // pixels' geometry can be asked of these.
 QuaternionMatrixd reduced_snapshots(const QuaternionMatrixd& g) {
@@ -84,12 +79,7 @@ BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& opt
   const QuaternionMatrixd r = reduced_snapshots(g);
   result.reference_times = Eigen::VectorXd::Zero(modes);
   if (options.amplitude == Amplitude::window) {
-    for (Index p = 0; p < modes; ++p)
-      result.reference_times(p) = fit_reference_time(result.eigenvalues(p), m);
-    const QuaternionMatrixd phi = r * result.combination;
-    const QuaternionMatrixd phi_h = phi.conjugate_transpose();
-    result.amplitudes =
-        fit_window_amplitudes(result.eigenvalues, result.reference_times, phi_h * phi, phi_h * r);
+    fit_to_window(&result, r * result.combination, r);
   } else {
     QuaternionMatrixd all(rank, rank);
     for (Index k = 0; k < rank; ++k) {
@@ -103,15 +93,7 @@ BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& opt
       result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   }
 
-  result.summary.background_modes = static_cast<int>(modes);
-  result.summary.lambda = result.eigenvalues(0);
-  result.summary.omega = omega_magnitude(result.summary.lambda);
-  QuaternionMatrixd error = q_tilde * w.col(0);
-  QuaternionMatrixd scaled = w.col(0);
-  scaled.scale_col(0, Quaterniond(result.summary.lambda));
-  error -= scaled;
-  const double size = q_tilde.norm();
-  result.summary.residual = size > 0 ? error.norm() / size : 0;
+  describe_nearest(&result, q_tilde, w.col(0));
   return result;
 }
 

@@ -9,21 +9,22 @@ namespace qdmd {
 SlidingGram::SlidingGram(int capacity)
     : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)) {}
 
-void SlidingGram::add_newest(const Window& window, int count) {
+void SlidingGram::add_newest(const Window& window, int count, int span) {
   const int size = window.size();
+  if (span == 0) span = size;
   std::vector<const uint8_t*> planes;
-  planes.reserve(static_cast<size_t>(size) * kChannels);
-  for (int t = 0; t < size; ++t)
+  planes.reserve(static_cast<size_t>(span) * kChannels);
+  for (int t = size - span; t < size; ++t)
     for (int c = 0; c < kChannels; ++c) planes.push_back(window.plane(window.slot(t), c));
   Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products(
-      kChannels * count, kChannels * size);
+      kChannels * count, kChannels * span);
   const auto rows = static_cast<size_t>(kChannels * count);
   dot_products(planes.data() + planes.size() - rows, rows, planes.data(), planes.size(),
                window.plane_size(), products.data());
   for (int k = 0; k < count; ++k) {
     const int added = window.slot(size - count + k);
-    for (int t = 0; t < size; ++t) {
-      const int slot = window.slot(t);
+    for (int t = 0; t < span; ++t) {
+      const int slot = window.slot(size - span + t);
       const auto block = products.block<kChannels, kChannels>(kChannels * k, kChannels * t);
       by_slot_.block<kChannels, kChannels>(kChannels * added, kChannels * slot) = block;
       by_slot_.block<kChannels, kChannels>(kChannels * slot, kChannels * added) = block.transpose();

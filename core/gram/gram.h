@@ -18,10 +18,10 @@ class SlidingGram {
   SlidingGram() = default;
   explicit SlidingGram(int capacity);
 
-  // Computes the inner products of the newest `count` snapshots of `window` with all it holds, 9 m
-  // products per pixel and snapshot. Every snapshot must be added before it leaves the window.
-  // Several at once read the window from memory once.
-  void add_newest(const Window& window, int count = 1);
+  // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
+  // (count <= span; 0: all), 9 span products per pixel and snapshot. Several at once read the
+  // window from memory once. Elements of matrix() are valid for pairs that met in such a call.
+  void add_newest(const Window& window, int count = 1, int span = 0);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const Window& window) const;

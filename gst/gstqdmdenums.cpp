@@ -1,0 +1,59 @@
+#include "gst/gstqdmdenums.h"
+
+#include "core/background/foreground.h"
+#include "core/dmd/options.h"
+
+using qdmd::Output;
+
+GType gst_qdmd_background_output_get_type() {
+  static const GEnumValue values[] = {
+      {int(Output::background), "The background L(t) at the frame's time", "background"},
+      {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
+      {int(Output::mask), "White where the residual exceeds the threshold, else black", "mask"},
+      {int(Output::cutout),
+       "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundOutput", values);
+  return type;
+}
+
+GType gst_qdmd_background_mode_get_type() {
+  static const GEnumValue values[] = {
+      {GST_QDMD_BACKGROUND_MODE_BATCH,
+       "Fill a window, solve, send its frames, each with its own L(t); a latency of "
+       "window-size - 1 frames",
+       "batch"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundMode", values);
+  return type;
+}
+
+GType gst_qdmd_background_method_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Method::qdmd), "Quaternion DMD of the coupled colour channels", "qdmd"},
+      {int(qdmd::Method::dmd), "Exact DMD of each colour channel by itself", "dmd"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundMethod", values);
+  return type;
+}
+
+GType gst_qdmd_background_amplitude_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Amplitude::window), "Fitted to all frames of the window (least squares)",
+       "window"},
+      {int(qdmd::Amplitude::first_frame), "Fitted to the first frame alone, as the paper does",
+       "first-frame"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundAmplitude", values);
+  return type;
+}
+
+GType gst_qdmd_background_solver_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
+      {int(qdmd::Solver::adjoint),
+       "The paper's procedure, literally, on the pixels (slow, small windows only)", "adjoint"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundSolver", values);
+  return type;
+}
