@@ -42,8 +42,8 @@ double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * 
 
 ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel& model,
                                            double fixed_threshold) {
-  constexpr int kFrames = 12;
-  constexpr size_t kRunsPerFrame = 48;
+  constexpr int kFrames = 8;
+  constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
   // The largest quaternion norm of a difference is 255 sqrt(3).
   std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{};
