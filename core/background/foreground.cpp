@@ -42,7 +42,7 @@ double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * 
 
 ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel& model,
                                            double fixed_threshold) {
-  constexpr int kFrames = 8;
+  constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
   // The largest quaternion norm of a difference is 255 sqrt(3).
