@@ -12,7 +12,10 @@ cd "$(dirname "$0")/.."
 
 tests/install-dependencies.sh build demo
 
-[ -f build/build.ninja ] || meson setup build
+# The folder may have been configured before the packages for the demo were there.
+again=()
+[ ! -f build/build.ninja ] || again=(--reconfigure)
+meson setup "${again[@]}" build -Dexamples=enabled
 ninja -C build gst/libgstqdmd.so examples/qdmd-demo
 
 demo=build/demo

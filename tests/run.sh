@@ -47,7 +47,10 @@ PYTHON
 build_and_test() {
   local folder=$1 suite=$2
   shift 2
-  [ -f "$folder/build.ninja" ] || meson setup "$folder" "$@"
+  local again=()
+  # The folder may have been configured before the packages for the tests were there.
+  [ ! -f "$folder/build.ninja" ] || again=(--reconfigure)
+  meson setup "${again[@]}" "$folder" -Dtests=enabled "$@"
   ninja -C "$folder"
   rm -f "$folder/meson-logs/testlog.junit.xml"
   local status=0
