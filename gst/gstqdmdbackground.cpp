@@ -554,8 +554,8 @@ static void install_properties(GObjectClass* object_class) {
                                          gint(engine.dmd.method), at_start));
   install(PROP_RANK,
           g_param_spec_uint("rank", "Rank",
-                            "Singular values that the decomposition keeps (0: all); a low rank is "
-                            "steadier where people stand still",
+                            "Singular values that the decomposition keeps (0: all); rank 1 is the "
+                            "steadiest where people stand still",
                             0, guint(EngineOptions::kMaxWindow), guint(engine.dmd.rank), at_start));
   install(PROP_OMEGA_THRESHOLD,
           g_param_spec_double("omega-threshold", "Omega threshold",
