@@ -248,10 +248,10 @@ ForegroundStatistics statistics_of(double sigma, double foreground, double fixed
   std::mt19937 rng(108);
   const size_t pixels = 6000, count = 10;
   Clip clip(pixels, count);
-  std::normal_distribution<double> noise(0, sigma);
+  std::normal_distribution<double> noise;
   for (size_t t = 0; t < count; ++t)
     for (size_t c = 0; c < 3; ++c)
-      for (size_t p = 0; p < pixels; ++p) clip.set(t, c, p, 128 + noise(rng));
+      for (size_t p = 0; p < pixels; ++p) clip.set(t, c, p, 128 + sigma * noise(rng));
   // Snapshot 0 is the background: flat.
   clip.frames[0].assign(3 * pixels, 128);
   for (size_t t = 1; t < count; ++t)
