@@ -81,6 +81,8 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::not_configured, "configure the engine before pushing frames"};
   if (ready_ > 0)
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
+  if (frame.width != width_ || frame.height != height_)
+    return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
   if (start_new_window_) flush();
   const int slot = window_.append();
   for (int c = 0; c < kChannels; ++c) copy_plane(frame.channel[c], frame, window_.plane(slot, c));

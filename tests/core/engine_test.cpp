@@ -167,6 +167,14 @@ Status::Code configured(const std::function<void(EngineOptions&)>& change, int w
   return status.code;
 }
 
+TEST(EngineStatus, FramesOfAnotherSize) {
+  Strip strip(8, window_of(3));
+  Picture wider(9, 1), higher(8, 2);
+  EXPECT_EQ(strip.engine.push(wider.in()).code, Status::Code::invalid_options);
+  EXPECT_EQ(strip.engine.push(higher.in()).code, Status::Code::invalid_options);
+  EXPECT_EQ(strip.engine.pending(), 0);
+}
+
 TEST(EngineStatus, RangesOfTheOptions) {
   using Options = EngineOptions;
   constexpr auto kOk = Status::Code::ok, kInvalid = Status::Code::invalid_options;
