@@ -4,6 +4,9 @@
 #include <gst/video/video.h>
 
 #include <unistd.h>
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -17,6 +20,7 @@ namespace {
 struct Unref {
   void operator()(GstElement* object) const { gst_object_unref(object); }
   void operator()(GstBus* object) const { gst_object_unref(object); }
+  void operator()(GstPad* object) const { gst_object_unref(object); }
   void operator()(GstMessage* message) const { gst_message_unref(message); }
   void operator()(GstSample* sample) const { gst_sample_unref(sample); }
 };
@@ -34,7 +38,8 @@ struct Options {
 constexpr const char* kTitles[] = {"input", "background", "foreground", "mask"};
 constexpr int kSheetRows = 5;
 
-volatile std::sig_atomic_t interrupted = 0;
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
 bool parse(int argc, char** argv, Options* options) {
   gint frames = 0, window_size = options->window_size;
@@ -86,17 +91,16 @@ std::string pipeline_text(const Options& options) {
       "window-size=" +
       std::to_string(options.window_size) + " output=";
   const std::string short_queue = " ! queue max-size-buffers=8 max-size-bytes=0 max-size-time=0 ";
-  const auto label = [](const char* title, const char* x, const char* y) {
-    return std::string(" ! textoverlay shaded-background=true font-desc=\"Sans 10\" text=") +
-           title + " halignment=position valignment=position xpos=" + x + " ypos=" + y;
-  };
+  std::string labels;
+  for (const char* title : kTitles)
+    labels += std::string(" ! textoverlay shaded-background=true font-desc=\"Sans 10\" text=") +
+              title + " name=label-" + title + " halignment=left valignment=top xpad=0 ypad=0";
   std::string text = options.test_source ? "videotestsrc pattern=ball num-buffers=300 ! "
                                            "video/x-raw,width=320,height=240,framerate=25/1 ! "
                                          : "filesrc name=file ! decodebin ! ";
-  text += "videoconvert ! video/x-raw,format=RGBx ! identity name=limit eos-after=";
-  text += std::to_string(options.frames > 0 ? options.frames + 1 : -1);
+  // Square pixels: the compositor would widen others, and the pictures would overlap.
   text +=
-      " ! tee name=t "
+      "videoconvert ! videoscale ! video/x-raw,format=RGBx,pixel-aspect-ratio=1/1 ! tee name=t "
       "t. ! queue max-size-buffers=0 max-size-bytes=0 max-size-time=0 ! grid.sink_0 ";
   text +=
       separate + "background ! tee name=b b." + short_queue + "! grid.sink_1 b." + short_queue +
@@ -105,28 +109,53 @@ std::string pipeline_text(const Options& options) {
   text += separate + "mask" + short_queue + "! grid.sink_3 ";
   text += "compositor name=grid background=black ! video/x-raw,format=RGBx ! tee name=g g." +
           short_queue + "! appsink name=grids sync=false async=false max-buffers=8 g." +
-          short_queue + "! videoconvert" + label(kTitles[0], "0.01", "0.01") +
-          label(kTitles[1], "0.51", "0.01") + label(kTitles[2], "0.01", "0.51") +
-          label(kTitles[3], "0.51", "0.51") +
+          short_queue + "! videoconvert" + labels +
           " ! video/x-raw,format=I420 ! x264enc speed-preset=veryfast ! mp4mux ! "
           "filesink name=video sync=false async=false";
   return text;
 }
 
-// Places the four pictures when their size is known.
-GstPadProbeReturn place_pictures(GstPad*, GstPadProbeInfo* info, gpointer grid) {
+// What the streaming thread needs where the video enters the tee.
+struct Entry {
+  GstBin* pipeline;
+  GstElement* grid;
+  guint64 limit;  // frames; 0: all
+  guint64 frames = 0;
+};
+
+// Places the four pictures and their labels.
+void place_pictures(const Entry& entry, const GstVideoInfo& video) {
+  for (int i = 0; i < 4; ++i) {
+    const int x = i % 2 * video.width, y = i / 2 * video.height;
+    const Ref<GstPad> pad(
+        gst_element_get_static_pad(entry.grid, ("sink_" + std::to_string(i)).c_str()));
+    g_object_set(pad.get(), "xpos", x, "ypos", y, nullptr);
+    const Ref<GstElement> label(
+        gst_bin_get_by_name(entry.pipeline, (std::string("label-") + kTitles[i]).c_str()));
+    g_object_set(label.get(), "deltax", x, "deltay", y, nullptr);
+  }
+}
+
+// Sees the size when it is known, and ends the video at the limit or when the user wants it to
+// stop. Every frame from there on is refused: identity's eos-after refuses one, and a decoder that
+// drains gets a later frame past it.
+GstPadProbeReturn at_entry(GstPad*, GstPadProbeInfo* info, gpointer data) {
+  Entry& entry = *static_cast<Entry*>(data);
+  if (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) {
+    if (!interrupted && (entry.limit == 0 || entry.frames < entry.limit)) {
+      ++entry.frames;
+      return GST_PAD_PROBE_OK;
+    }
+    gst_buffer_unref(GST_PAD_PROBE_INFO_BUFFER(info));
+    GST_PAD_PROBE_INFO_FLOW_RETURN(info) = GST_FLOW_EOS;
+    return GST_PAD_PROBE_HANDLED;
+  }
   GstEvent* event = GST_PAD_PROBE_INFO_EVENT(info);
   if (GST_EVENT_TYPE(event) != GST_EVENT_CAPS) return GST_PAD_PROBE_OK;
   GstCaps* caps = nullptr;
   gst_event_parse_caps(event, &caps);
   GstVideoInfo video;
-  if (!gst_video_info_from_caps(&video, caps)) return GST_PAD_PROBE_OK;
-  for (int i = 0; i < 4; ++i) {
-    const std::string name = "sink_" + std::to_string(i);
-    GstPad* pad = gst_element_get_static_pad(GST_ELEMENT(grid), name.c_str());
-    g_object_set(pad, "xpos", i % 2 * video.width, "ypos", i / 2 * video.height, nullptr);
-    gst_object_unref(pad);
-  }
+  if (gst_video_info_from_caps(&video, caps)) place_pictures(entry, video);
   return GST_PAD_PROBE_OK;
 }
 
@@ -145,23 +174,57 @@ cv::Mat picture_of(GstSample* sample) {
   return picture;
 }
 
+// Small grids, evenly spaced over a video whose length need not be known: when there are many,
+// every other one goes and the spacing doubles.
+class Moments {
+ public:
+  static constexpr int kWidth = 300;  // of each picture
+
+  void add(GstSample* sample) {
+    if (seen_++ % step_ != 0) return;
+    const cv::Mat grid = picture_of(sample);
+    if (grid.empty()) return;
+    if (kept_.empty())
+      size_ = {2 * kWidth, 2 * std::clamp(kWidth * grid.rows / grid.cols, 1, 4 * kWidth)};
+    cv::Mat small;
+    cv::resize(grid, small, size_, 0, 0, cv::INTER_AREA);
+    kept_.push_back(small);
+    if (kept_.size() < kMost) return;
+    for (size_t i = 0; i < kMost / 2; ++i) kept_[i] = kept_[2 * i];
+    kept_.resize(kMost / 2);
+    step_ *= 2;
+  }
+
+  // The middles of equal parts of the video.
+  std::vector<cv::Mat> pick(size_t count) const {
+    count = std::min(count, kept_.size());
+    std::vector<cv::Mat> picked;
+    for (size_t i = 0; i < count; ++i)
+      picked.push_back(kept_[(2 * i + 1) * kept_.size() / (2 * count)]);
+    return picked;
+  }
+
+ private:
+  static constexpr size_t kMost = 64;
+  std::vector<cv::Mat> kept_;
+  cv::Size size_;
+  guint64 seen_ = 0, step_ = 1;
+};
+
 // One row a moment, four columns: the grid's pictures side by side under their titles.
 cv::Mat contact_sheet(const std::vector<cv::Mat>& grids) {
-  constexpr int kWidth = 300, kGap = 6, kTitle = 28;
-  const int height = std::max(1, kWidth * grids[0].rows / grids[0].cols);
+  constexpr int kWidth = Moments::kWidth, kGap = 6, kTitle = 28;
+  const int height = grids[0].rows / 2;
   cv::Mat sheet(kTitle + static_cast<int>(grids.size()) * (height + kGap),
                 4 * (kWidth + kGap) + kGap, CV_8UC3, cv::Scalar::all(255));
   for (int column = 0; column < 4; ++column) {
     const int x = kGap + column * (kWidth + kGap);
     cv::putText(sheet, kTitles[column], {x, 20}, cv::FONT_HERSHEY_SIMPLEX, 0.6, cv::Scalar::all(0),
                 1, cv::LINE_AA);
-    for (size_t row = 0; row < grids.size(); ++row) {
-      const cv::Mat& grid = grids[row];
-      const cv::Rect part(column % 2 * grid.cols / 2, column / 2 * grid.rows / 2, grid.cols / 2,
-                          grid.rows / 2);
-      const cv::Rect place(x, kTitle + static_cast<int>(row) * (height + kGap), kWidth, height);
-      cv::resize(grid(part), sheet(place), place.size(), 0, 0, cv::INTER_AREA);
-    }
+    const cv::Rect part(column % 2 * kWidth, column / 2 * height, kWidth, height);
+    for (size_t row = 0; row < grids.size(); ++row)
+      grids[row](part).copyTo(
+          sheet(cv::Rect(x, kTitle + static_cast<int>(row) * (height + kGap), kWidth, height)));
   }
   return sheet;
 }
@@ -200,6 +263,10 @@ Outcome poll(GstElement* pipeline, GstClockTime wait) {
 }
 
 int run(const Options& options) {
+  if (g_mkdir_with_parents(options.output_dir.c_str(), 0777) != 0) {
+    std::fprintf(stderr, "%s: %s\n", options.output_dir.c_str(), g_strerror(errno));
+    return 1;
+  }
   GError* error = nullptr;
   const Ref<GstElement> pipeline(gst_parse_launch(pipeline_text(options).c_str(), &error));
   if (error) {
@@ -216,20 +283,21 @@ int run(const Options& options) {
   g_object_set(element("video").get(), "location", path("separated.mp4").c_str(), nullptr);
   const Ref<GstElement> grid = element("grid"), grids = element("grids"), tee = element("t"),
                         background = element("background");
-  GstPad* tee_pad = gst_element_get_static_pad(tee.get(), "sink");
-  gst_pad_add_probe(tee_pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, place_pictures, grid.get(),
-                    nullptr);
-  gst_object_unref(tee_pad);
+  const Ref<GstPad> tee_pad(gst_element_get_static_pad(tee.get(), "sink"));
+  Entry entry{GST_BIN(pipeline.get()), grid.get(), static_cast<guint64>(options.frames)};
+  gst_pad_add_probe(
+      tee_pad.get(),
+      GstPadProbeType(GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM), at_entry,
+      &entry, nullptr);
 
   const gint64 start = g_get_monotonic_time();
   gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
   Progress progress;
-  std::vector<cv::Mat> moments;
-  cv::Mat last_grid;
+  Moments moments;
   guint64 frames = 0;
   Outcome outcome = Outcome::running;
   gint64 length = 0;
-  while (!interrupted && outcome != Outcome::failed) {
+  while (outcome != Outcome::failed) {
     if (outcome == Outcome::running) outcome = poll(pipeline.get(), 0);
     const Ref<GstSample> sample(
         gst_app_sink_try_pull_sample(GST_APP_SINK(grids.get()), 200 * GST_MSECOND));
@@ -246,44 +314,46 @@ int run(const Options& options) {
             : 300;
     if (options.frames > 0) total = std::min(total, static_cast<double>(options.frames));
     const double share = std::min(1.0, static_cast<double>(frames) / total);
-    // The middle of each fifth of the video.
-    if (share * kSheetRows >= static_cast<double>(moments.size()) + 0.5 &&
-        moments.size() < kSheetRows)
-      moments.push_back(picture_of(sample.get()));
+    moments.add(sample.get());
     progress.show(frames, share);
   }
   progress.end();
   const double seconds = static_cast<double>(g_get_monotonic_time() - start) / G_USEC_PER_SEC;
   // The video file is whole when every sink has seen the end.
-  if (outcome == Outcome::running && !interrupted) outcome = poll(pipeline.get(), 60 * GST_SECOND);
+  if (outcome == Outcome::running) outcome = poll(pipeline.get(), 60 * GST_SECOND);
   GstSample* newest = nullptr;
   g_object_get(background.get(), "last-sample", &newest, nullptr);
   const Ref<GstSample> background_sample(newest);
+  // An element's own words can miss the point: sound alone is an "internal data stream error".
+  const bool no_video = !gst_pad_has_current_caps(tee_pad.get());
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
-  if (interrupted) return 130;
   if (outcome != Outcome::finished) {
+    if (no_video && !options.video.empty())
+      std::fprintf(stderr, "No video could be decoded from %s.\n", options.video.c_str());
     if (outcome == Outcome::running) std::fprintf(stderr, "The video could not be finished.\n");
     return 1;
   }
   if (frames == 0 || !background_sample) {
+    if (interrupted) return 130;
     std::fprintf(stderr, "%s has no frames.\n", options.video.c_str());
     return 1;
   }
 
   const cv::Mat picture = picture_of(background_sample.get());
-  if (moments.empty() || !cv::imwrite(path("background.png"), picture) ||
-      !cv::imwrite(path("contact-sheet.png"), contact_sheet(moments))) {
+  const std::vector<cv::Mat> rows = moments.pick(kSheetRows);
+  if (rows.empty() || !cv::imwrite(path("background.png"), picture) ||
+      !cv::imwrite(path("contact-sheet.png"), contact_sheet(rows))) {
     std::fprintf(stderr, "Cannot write to %s.\n", options.output_dir.c_str());
     return 1;
   }
   std::printf(
       "Separated %llu frames of %dx%d in %.1f s: %.1f frames/s for background, foreground and mask "
       "together, the H.264 video included.\n",
-      static_cast<unsigned long long>(frames), picture.cols, picture.rows, seconds,
-      static_cast<double>(frames) / seconds);
+      static_cast<unsigned long long>(entry.frames), picture.cols, picture.rows, seconds,
+      static_cast<double>(entry.frames) / seconds);
   for (const char* name : {"background.png", "separated.mp4", "contact-sheet.png"})
     std::printf("  %s\n", path(name).c_str());
-  return 0;
+  return interrupted ? 130 : 0;
 }
 
 }  // namespace
@@ -291,7 +361,11 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   if (!parse(argc, argv, &options)) return 2;
-  std::signal(SIGINT, [](int) { interrupted = 1; });
+  // The first Ctrl-C ends the video early and keeps what is done, the second one ends the program.
+  std::signal(SIGINT, [](int) {
+    interrupted = true;
+    std::signal(SIGINT, SIG_DFL);
+  });
   try {
     return run(options);
   } catch (const std::exception& exception) {

@@ -6,7 +6,7 @@
 # Installs what is missing (as root or through sudo) and writes to build/demo.
 set -euo pipefail
 video=${1:-}
-[ -z "$video" ] || video=$(realpath -e -- "$video") ||
+[ -z "$video" ] || video=$(realpath -e -- "$video" 2>/dev/null) ||
   { echo "There is no such video: $1" >&2; exit 1; }
 cd "$(dirname "$0")/.."
 
@@ -30,8 +30,8 @@ fetch_street_scene() {
   local found
   found=$(find "$folder/unpacked" \( -name vtest.avi -o -name vtest.avi.gz \) -print -quit)
   case "$found" in
-    *.gz) gunzip -c "$found" >"$1.part" ;;
-    ?*) cp "$found" "$1.part" ;;
+    *.gz) gunzip -c "$found" >"$1.part" || return 1 ;;
+    ?*) cp "$found" "$1.part" || return 1 ;;
     *) return 1 ;;
   esac
   mv "$1.part" "$1"
