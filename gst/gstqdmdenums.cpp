@@ -51,6 +51,10 @@ GType gst_qdmd_background_amplitude_get_type() {
 GType gst_qdmd_background_solver_get_type() {
   static const GEnumValue values[] = {
       {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
+      {int(qdmd::Solver::gram_extended),
+       "The Gram matrix factorized in double-double: for nearly dependent frames", "gram-extended"},
+      {int(qdmd::Solver::qr), "From a QR factorization of the pixel columns in double (slow)",
+       "qr"},
       {int(qdmd::Solver::adjoint),
        "The paper's procedure, literally, on the pixels (slow, small windows only)", "adjoint"},
       {0, nullptr, nullptr}};

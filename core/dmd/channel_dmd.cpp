@@ -27,7 +27,7 @@ Spectrum positive_spectrum(const Eigen::MatrixXd& g, Index limit) {
 
 // The nearest modes, completed by the conjugates of non-real ones.
 std::vector<Index> select_with_conjugates(const Eigen::VectorXcd& values, double threshold) {
-  std::vector<Index> chosen = select_background(values, threshold);
+  std::vector<Index> chosen = select_background<double>(values, threshold);
   const size_t count = chosen.size();
   for (size_t i = 0; i < count; ++i) {
     const Index k = chosen[i];

@@ -19,6 +19,20 @@ QuaternionMatrixd pixels_of(const Window& window) {
   return x;
 }
 
+BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram,
+                                 const DmdOptions& options) {
+  switch (options.solver) {
+    case Solver::qr:
+      return qdmd_from_qr(window, options);
+    case Solver::adjoint:
+      return qdmd_from_adjoint(pixels_of(window), options);
+    case Solver::gram:
+    case Solver::gram_extended:
+      break;
+  }
+  return qdmd_from_gram(quaternion_gram(gram), options);
+}
+
 Decomposition single_snapshot() {
   Decomposition result;
   result.background = TemporalModel(1);
@@ -52,9 +66,7 @@ Decomposition decompose(const Window& window, const IntegerMatrix& gram,
                         const DmdOptions& options) {
   if (gram.rows() == kChannels) return single_snapshot();
   if (options.method == Method::dmd) return decompose_channels(gram, options);
-  const BackgroundModes modes = options.solver == Solver::adjoint
-                                    ? qdmd_from_adjoint(pixels_of(window), options)
-                                    : qdmd_from_gram(quaternion_gram(gram), options);
+  const BackgroundModes modes = quaternion_modes(window, gram, options);
   Decomposition result;
   result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
   for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)

@@ -13,7 +13,7 @@ struct Decomposition {
 };
 
 // `gram` is the exact Gram matrix of `window` in time order (3m x 3m). The pixels are read by
-// Solver::adjoint only. m >= 1; a single snapshot is its own background.
+// Solver::qr and Solver::adjoint only. m >= 1; a single snapshot is its own background.
 Decomposition decompose(const Window& window, const IntegerMatrix& gram, const DmdOptions& options);
 
 }  // namespace qdmd

@@ -11,8 +11,10 @@ enum class Method {
 };
 
 enum class Solver {
-  gram,    // from the exact Gram matrix alone
-  adjoint  // the paper's procedure, literally, on the complex adjoint of the pixels
+  gram,           // from the exact Gram matrix alone
+  gram_extended,  // the same with the Gram matrix factorized in double-double
+  qr,             // from a Householder QR factorization of the pixel columns
+  adjoint         // the paper's procedure, literally, on the complex adjoint of the pixels
 };
 
 enum class Amplitude {
@@ -38,8 +40,11 @@ struct DmdSummary {
   int background_modes = 0;         // 0 where X is zero
   std::complex<double> lambda = 0;  // eigenvalue, imaginary part >= 0
   double omega = 0;                 // |ln lambda|, rad/frame; infinity where lambda = 0
-  double residual = 0;              // |Q~ w - w lambda| / (|Q~| |w|)
-  double condition = 1;             // largest over smallest singular value that was kept
+  // Of the eigenpair, relative: |Q~ w - w lambda| / (|Q~| |w|), or at full rank
+  // |H v - R11 v lambda| / ((|H| + |lambda| |R11|) |v|). A few epsilon where all is well.
+  double residual = 0;
+  // Largest over smallest singular value that was kept; at full rank an estimate from below.
+  double condition = 1;
   // False: the eigenvalue iteration did not end, and rank one was solved in its place.
   bool converged = true;
 };

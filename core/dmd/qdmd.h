@@ -1,15 +1,22 @@
-// Q-DMD (the paper's Algorithm 2) from the Gram matrix, and literally from the pixels.
+// Q-DMD (the paper's Algorithm 2), one function for each way to it.
 #pragma once
 
 #include "core/dmd/modes.h"
+#include "core/gram/window.h"
 
 namespace qdmd {
 
-// From the quaternion Gram matrix g = [x_1 .. x_m]^H [x_1 .. x_m] (m x m, Hermitian) alone.
-// With X^H X = V S^2 V^H, Q~ = U^H Y V S^-1 equals S^-1 V^H (X^H Y) V S^-1. Singular values count
-// as zero below sqrt(4 m epsilon) of the largest: the Gram matrix squares them. m = 0 or 1, and
-// X = 0, have no mode (P = 0).
+// From the quaternion Gram matrix g = [x_1 .. x_m]^H [x_1 .. x_m] (m x m, Hermitian) alone, for
+// Solver::gram and Solver::gram_extended. The Gram matrix squares singular values: those below
+// sqrt(4 m epsilon) of the largest count as zero. Factorized in double-double it does not matter,
+// and the limit is 4 m epsilon. m = 0 or 1, and X = 0, have no mode (P = 0).
 BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& options);
+
+// From the triangular factor of a Householder QR factorization of the pixel columns, in double:
+// the Gram matrix is not used. Time grows with n m^2, at many times the cost of the Gram matrix;
+// memory is some hundred rows. Singular values below max(n, m) epsilon of the largest count as
+// zero.
+BackgroundModes qdmd_from_qr(const Window& window, const DmdOptions& options);
 
 // The paper's procedure on the pixels themselves, x = [x_1 .. x_m] (n x m): the SVD of the complex
 // adjoint of X and its odd columns, eigenvectors of the adjoint of Q~, Phi^+ x_1 on pixels. Time

@@ -43,10 +43,8 @@ double adjoint_bytes(double pixels, double snapshots) {
 
 BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& options) {
   using Index = Eigen::Index;
-  BackgroundModes result;
   const Index m = x.cols();
-  result.combination = QuaternionMatrixd(m, 0);
-  result.amplitudes = QuaternionMatrixd(0, 1);
+  BackgroundModes result(m);
   if (m < 2 || x.rows() == 0) return result;
   const auto y = x.right_cols(m - 1);
 
@@ -93,7 +91,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   // Step 4, then the background's share.
   const QuaternionMatrixd lower = v_over_s * w;
   const QuaternionMatrixd phi = y * lower;
-  const auto chosen = select_background(eigenvalues, options.omega_threshold);
+  const auto chosen = select_background<double>(eigenvalues, options.omega_threshold);
   const Index modes = static_cast<Index>(chosen.size());
   result.eigenvalues.resize(modes);
   result.combination = QuaternionMatrixd(m, modes);
@@ -110,13 +108,13 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, background, x);
   } else {
-    const auto b = first_frame_amplitudes(phi, x.col(0));
+    const auto b = first_frame_amplitudes<double>(phi, x.col(0));
     result.amplitudes = QuaternionMatrixd(modes, 1);
     for (Index p = 0; p < modes; ++p)
       result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   }
 
-  describe_nearest(&result, q_tilde, w.col(chosen[0]));
+  describe_nearest(&result, eigenpair_residual(q_tilde, w.col(chosen[0]), result.eigenvalues(0)));
   return result;
 }
 

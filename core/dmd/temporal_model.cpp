@@ -5,14 +5,6 @@
 
 namespace qdmd {
 
-std::complex<double> power(std::complex<double> lambda, double t) {
-  constexpr double kLargestExponent = 600;
-  if (t == 0) return 1;
-  if (lambda == 0.0) return 0;
-  const double exponent = std::min(std::log(std::abs(lambda)) * t, kLargestExponent);
-  return std::polar(std::exp(exponent), std::arg(lambda) * t);
-}
-
 void TemporalModel::add_mode(const QuaternionMatrixd& combination, std::complex<double> lambda,
                              double reference_time, const Quaterniond& amplitude) {
   terms_.push_back({-1, picture_count(), 4, lambda, reference_time, amplitude});

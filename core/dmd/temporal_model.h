@@ -49,6 +49,16 @@ class TemporalModel {
 };
 
 // lambda^t, with 0^0 = 1, for any real t >= 0 where lambda is 0. Its size saturates at e^600.
-std::complex<double> power(std::complex<double> lambda, double t);
+template <typename Real>
+std::complex<Real> power(const std::complex<Real>& lambda, double t) {
+  using std::atan2, std::cos, std::exp, std::log, std::sin;
+  const Real size = Quaternion<Real>(lambda).norm();
+  if (t == 0) return Real(1);
+  if (!(size > Real(0))) return Real(0);
+  const Real exponent = std::min(Real(log(size) * Real(t)), Real(600));
+  const Real angle = atan2(lambda.imag(), lambda.real()) * Real(t);
+  const Real length = exp(exponent);
+  return {Real(length * cos(angle)), Real(length * sin(angle))};
+}
 
 }  // namespace qdmd

@@ -58,6 +58,28 @@ class QuaternionMatrix {
     using std::sqrt;
     return sqrt(squared_norm());
   }
+  // Divides by the power of two that brings the largest part near one, and returns its exponent
+  // (0 for a zero matrix). No digit is lost but to underflow.
+  int normalize() {
+    using std::frexp;
+    if (a.size() == 0) return 0;
+    const Real largest = std::max({a.real().cwiseAbs().maxCoeff(), a.imag().cwiseAbs().maxCoeff(),
+                                   b.real().cwiseAbs().maxCoeff(), b.imag().cwiseAbs().maxCoeff()});
+    int exponent = 0;
+    if (largest > Real(0)) (void)frexp(largest, &exponent);
+    scale_by_power_of_two(-exponent);
+    return exponent;
+  }
+  void scale_by_power_of_two(int exponent) {
+    using std::ldexp;
+    const auto scale = [exponent](const Complex& c) {
+      return Complex(ldexp(c.real(), exponent), ldexp(c.imag(), exponent));
+    };
+    if (exponent == 0) return;
+    a = a.unaryExpr(scale).eval();
+    b = b.unaryExpr(scale).eval();
+  }
+
   bool all_finite() const { return a.allFinite() && b.allFinite(); }
 
   // Columns times real numbers: M diag(d).

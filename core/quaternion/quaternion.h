@@ -35,6 +35,8 @@ struct Quaternion {
     using std::sqrt;
     return sqrt(x * x + y * y + z * z);
   }
+  // 1 / q; not finite for zero.
+  Quaternion inverse() const { return conj() * (Real(1) / squared_norm()); }
   // q / |q|; one where q is zero, so that it can always serve as a phase.
   Quaternion unit() const {
     const Real length = norm();

@@ -2,9 +2,8 @@
 #pragma once
 
 #include <Eigen/Eigenvalues>
-#include <array>
 
-#include "core/quaternion/householder.h"
+#include "core/quaternion/hessenberg.h"
 
 namespace qdmd {
 
@@ -23,72 +22,6 @@ struct SchurForm {
 
 namespace internal {
 
-// A row-major array of quaternion scalars: the QR sweeps touch two or three rows at a time.
-template <typename Real>
-class ScalarGrid {
- public:
-  explicit ScalarGrid(const QuaternionMatrix<Real>& m)
-      : cols_(m.cols()), data_(static_cast<size_t>(m.rows() * m.cols())) {
-    for (Eigen::Index r = 0; r < m.rows(); ++r)
-      for (Eigen::Index c = 0; c < m.cols(); ++c) (*this)(r, c) = m.get(r, c);
-  }
-  Quaternion<Real>& operator()(Eigen::Index r, Eigen::Index c) {
-    return data_[static_cast<size_t>(r * cols_ + c)];
-  }
-  QuaternionMatrix<Real> matrix() {
-    const Eigen::Index rows = static_cast<Eigen::Index>(data_.size()) / cols_;
-    QuaternionMatrix<Real> m(rows, cols_);
-    for (Eigen::Index r = 0; r < rows; ++r)
-      for (Eigen::Index c = 0; c < cols_; ++c) m.set(r, c, (*this)(r, c));
-    return m;
-  }
-
- private:
-  Eigen::Index cols_;
-  std::vector<Quaternion<Real>> data_;
-};
-
-// Two or three entries of a reflector I - tau v v^H.
-template <typename Real>
-struct SmallReflector {
-  std::array<Quaternion<Real>, 3> v;
-  Real tau{0};
-  int size = 0;
-
-  SmallReflector(const std::array<Quaternion<Real>, 3>& x, int size_) : v(x), size(size_) {
-    using std::sqrt;
-    Real squared(0), largest(0);
-    // Scaled by the largest entry: shifts square the entries of the matrix.
-    for (int i = 0; i < size; ++i) largest = std::max(largest, v[i].norm());
-    if (!(largest > Real(0))) return;
-    for (int i = 0; i < size; ++i) {
-      v[i] = v[i] * (Real(1) / largest);
-      squared += v[i].squared_norm();
-    }
-    v[0] += v[0].unit() * sqrt(squared);
-    squared = Real(0);
-    for (int i = 0; i < size; ++i) squared += v[i].squared_norm();
-    tau = Real(2) / squared;
-  }
-
-  void left(ScalarGrid<Real>& m, Eigen::Index row, Eigen::Index from, Eigen::Index to) const {
-    for (Eigen::Index c = from; c < to; ++c) {
-      Quaternion<Real> w;
-      for (int i = 0; i < size; ++i) w += v[i].conj() * m(row + i, c);
-      w = w * tau;
-      for (int i = 0; i < size; ++i) m(row + i, c) -= v[i] * w;
-    }
-  }
-  void right(ScalarGrid<Real>& m, Eigen::Index col, Eigen::Index from, Eigen::Index to) const {
-    for (Eigen::Index r = from; r < to; ++r) {
-      Quaternion<Real> u;
-      for (int i = 0; i < size; ++i) u += m(r, col + i) * v[i];
-      u = u * tau;
-      for (int i = 0; i < size; ++i) m(r, col + i) -= u * v[i].conj();
-    }
-  }
-};
-
 // Schur form of the adjoint of the 2 x 2 block at (k, k): its diagonal holds the block's two
 // standard eigenvalues and their conjugates, its first vector an eigenvector of the block.
 template <typename Real>
@@ -103,24 +36,6 @@ Eigen::ComplexSchur<Eigen::Matrix<std::complex<Real>, 4, 4>> block_schur(ScalarG
 
 }  // namespace internal
 
-// Reduces m to upper Hessenberg form in place and returns Q with m_before = Q m_after Q^H.
-template <typename Real>
-QuaternionMatrix<Real> reduce_to_hessenberg(QuaternionMatrix<Real>& m) {
-  const Eigen::Index size = m.rows();
-  auto q = QuaternionMatrix<Real>::identity(size);
-  for (Eigen::Index k = 0; k + 2 < size; ++k) {
-    const Eigen::Index below = size - k - 1;
-    const auto h = make_reflector(m.block(k + 1, k, below, 1));
-    apply_left(h, m, k + 1, k + 1, below);
-    m.a.col(k).tail(below).setZero();
-    m.b.col(k).tail(below).setZero();
-    m.set(k + 1, k, h.alpha);
-    apply_right(h, m, 0, size, k + 1);
-    apply_right(h, q, 0, size, k + 1);
-  }
-  return q;
-}
-
 // Implicit double-shift QR algorithm on quaternions (Bunse-Gerstner, Byers and Mehrmann 1989):
 // the shift polynomial t^2 - 2 Re(s) t + |s|^2 has real coefficients, so it commutes with
 // quaternion arithmetic, and one step deflates a whole eigenvalue class. 2 x 2 blocks are split by
@@ -132,8 +47,10 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
   using std::abs;
   const Index size = m.rows();
   SchurForm<Real> form;
+  // By a power of two, which rounds nothing: shift polynomials square the entries.
+  const int exponent = m.normalize();
   const auto hessenberg_basis = reduce_to_hessenberg(m);
-  internal::ScalarGrid<Real> h(m), q(hessenberg_basis);
+  ScalarGrid<Real> h(m), q(hessenberg_basis);
   const Real epsilon = std::numeric_limits<Real>::epsilon();
   const Real scale = m.norm();
 
@@ -167,7 +84,7 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
     if (lo == hi - 1) {
       const auto vector =
           QuaternionMatrix<Real>::from_adjoint_columns(block.matrixU().col(0).eval());
-      const internal::SmallReflector<Real> p({vector.get(0, 0), vector.get(1, 0), Q()}, 2);
+      const SmallReflector<Real> p({vector.get(0, 0), vector.get(1, 0), Q()}, 2);
       p.left(h, lo, lo, size);
       p.right(h, lo, 0, hi + 1);
       p.right(q, lo, 0, size);
@@ -201,7 +118,7 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
     for (Index k = lo; k < hi; ++k) {
       const int count = static_cast<int>(std::min<Index>(3, hi - k + 1));
       if (k > lo) bulge = {h(k, k - 1), h(k + 1, k - 1), count == 3 ? h(k + 2, k - 1) : Q()};
-      const internal::SmallReflector<Real> p(bulge, count);
+      const SmallReflector<Real> p(bulge, count);
       p.left(h, k, k > lo ? k - 1 : lo, size);
       p.right(h, k, 0, std::min(k + 3, hi) + 1);
       p.right(q, k, 0, size);
@@ -211,6 +128,7 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
   }
 
   form.t = h.matrix();
+  form.t.scale_by_power_of_two(exponent);
   form.q = q.matrix();
   for (Index k = 0; k < size; ++k) {
     const Q value = form.t.get(k, k);

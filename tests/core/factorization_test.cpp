@@ -120,49 +120,99 @@ TEST(Qr, ZeroColumns) {
 
 TEST(Cholesky, FactorsAGramMatrix) {
   std::mt19937 rng(27);
-  for (int size : {1, 2, 7, 30}) {
+  // Around the width of a panel, and several.
+  for (int size : {1, 2, 7, 23, 24, 25, 49, 80}) {
     const auto x = random_matrix(3 * size, size, rng);
     const auto g = x.conjugate_transpose() * x;
-    const auto r = cholesky(g, 4 * size * kEpsilon);
-    ASSERT_TRUE(r.has_value());
+    const auto factor = cholesky(g, 4 * size * kEpsilon);
+    ASSERT_TRUE(factor.complete());
+    const auto& r = factor.r;
     // Higham, theorem 10.3: (size + 1) roundings of 4-product terms, |R|^2 = trace of G.
-    const double tolerance = 8 * (size + 1) * kEpsilon * r->squared_norm();
-    EXPECT_LE(distance(r->conjugate_transpose() * *r, g), tolerance);
+    const double tolerance = 8 * (size + 1) * kEpsilon * r.squared_norm();
+    EXPECT_LE(distance(r.conjugate_transpose() * r, g), tolerance);
     for (int i = 0; i < size; ++i) {
-      EXPECT_EQ(r->get(i, i).vector_norm(), 0);
-      EXPECT_GT(r->get(i, i).w, 0);
-      for (int j = 0; j < i; ++j) EXPECT_EQ(r->get(i, j).norm(), 0);
+      EXPECT_EQ(r.get(i, i).vector_norm(), 0);
+      EXPECT_GT(r.get(i, i).w, 0);
+      for (int j = 0; j < i; ++j) EXPECT_EQ(r.get(i, j).norm(), 0);
     }
     // A well conditioned Gram matrix (about 10): the R of the QR, to within that much more.
-    EXPECT_LE(distance(*r, qr(x, false).r), 100 * (size + 1) * kEpsilon * r->norm());
+    EXPECT_LE(distance(r, qr(x, false).r), 100 * (size + 1) * kEpsilon * r.norm());
   }
 }
 
 TEST(Cholesky, ReadsTheLowerTriangleOnly) {
   std::mt19937 rng(28);
-  const auto x = random_matrix(9, 4, rng);
+  const int size = 30;
+  const auto x = random_matrix(2 * size, size, rng);
   const auto g = x.conjugate_transpose() * x;
   auto lower = g;
-  for (int c = 1; c < 4; ++c)
+  for (int c = 1; c < size; ++c)
     for (int r = 0; r < c; ++r) lower.set(r, c, Quaterniond(std::nan("")));
   const auto whole_factor = cholesky(g, kEpsilon), lower_factor = cholesky(lower, kEpsilon);
-  ASSERT_TRUE(whole_factor && lower_factor);
-  EXPECT_EQ(distance(*whole_factor, *lower_factor), 0);
+  ASSERT_TRUE(whole_factor.complete() && lower_factor.complete());
+  EXPECT_EQ(distance(whole_factor.r, lower_factor.r), 0);
 }
 
-TEST(Cholesky, RefusesSingularMatrices) {
-  const int size = 6;
+TEST(Cholesky, StopsAtTheRank) {
   std::mt19937 rng(29);
-  const auto deficient = random_matrix(3, size, rng);
-  EXPECT_FALSE(cholesky(deficient.conjugate_transpose() * deficient, 4 * size * kEpsilon));
-  EXPECT_FALSE(cholesky(QuaternionMatrixd(size, size), 4 * size * kEpsilon));
+  // In the first panel, at its end, behind it.
+  for (int rank : {0, 1, 3, 24, 31}) {
+    const int size = 40;
+    const auto deficient = random_matrix(rank, size, rng);
+    const auto g = deficient.conjugate_transpose() * deficient;
+    const auto factor = cholesky(g, 4 * size * kEpsilon);
+    EXPECT_EQ(factor.pivots, rank);
+    EXPECT_EQ(factor.r.rows(), rank);
+    EXPECT_EQ(factor.r.cols(), size);
+    EXPECT_EQ(factor.complete(), false);
+    // Leading columns of random matrices: the condition number, squared, stays below 1e5.
+    EXPECT_LE(distance(factor.r.conjugate_transpose() * factor.r, g),
+              1e5 * 8 * size * kEpsilon * g.norm());
+  }
   // Exactly equal columns leave an exact zero pivot; tolerance 0 has to refuse it too.
   QuaternionMatrixd ones(2, 2);
   ones.a.setConstant(4.0);
-  EXPECT_FALSE(cholesky(ones, 0.0));
+  EXPECT_EQ(cholesky(ones, 0.0).pivots, 1);
   auto indefinite = QuaternionMatrixd::identity(3);
   indefinite.a(2, 2) = -1;
-  EXPECT_FALSE(cholesky(indefinite, 0.0));
+  EXPECT_EQ(cholesky(indefinite, 0.0).pivots, 2);
+}
+
+TEST(PivotedCholesky, FactorsAnyRankInTheOrderOfTheColumns) {
+  std::mt19937 rng(33);
+  for (int size : {1, 5, 40})
+    for (int rank : {0, 1, size / 2, size}) {
+      auto x = random_matrix(rank, size, rng);
+      // A first column of zeros stops the factorization in order.
+      if (rank < size) {
+        x.a.col(0).setZero();
+        x.b.col(0).setZero();
+      }
+      const auto g = x.conjugate_transpose() * x;
+      const auto factor = pivoted_cholesky(g, 4 * size * kEpsilon);
+      EXPECT_EQ(factor.pivots, std::min(rank, rank < size ? size - 1 : size));
+      // Backward stable without the condition number (Higham, theorem 10.14).
+      EXPECT_LE(distance(factor.r.conjugate_transpose() * factor.r, g),
+                64 * size * kEpsilon * g.norm() + 1e-300);
+    }
+}
+
+TEST(ConditionEstimate, IsALowerBoundNearTheTruth) {
+  std::mt19937 rng(34);
+  for (int size : {1, 2, 10, 40})
+    for (double condition : {1.0, 1e3, 1e8, 1e13}) {
+      Eigen::VectorXcd values(size);
+      for (int k = 0; k < size; ++k)
+        values(k) = std::pow(condition, -static_cast<double>(k) / std::max(1, size - 1));
+      const auto r =
+          qr(random_unitary(size, rng) * diagonal(values) * random_unitary(size, rng), false).r;
+      const double truth = size > 1 ? condition : 1;
+      const double estimate = condition_estimate(ScalarGrid<double>(r));
+      // The smallest singular value itself is only good to epsilon times the largest.
+      const double tolerance = 100 * size * kEpsilon * condition;
+      EXPECT_LE(estimate, truth * (1 + tolerance)) << size << ' ' << condition;
+      EXPECT_GE(estimate, truth / 3) << size << ' ' << condition;
+    }
 }
 
 TEST(SolveUpper, SolvesWithQuaternionPivots) {

@@ -226,7 +226,7 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   EXPECT_EQ(3, output);
   EXPECT_EQ(1, method);
   EXPECT_EQ(1, amplitude);
-  EXPECT_EQ(1, solver);
+  EXPECT_EQ(3, solver);
   EXPECT_EQ(0, mode);
   EXPECT_EQ(33u, window);
   EXPECT_EQ(3u, rank);

@@ -52,8 +52,9 @@ TEST(Content, EachOutputBelongsToItsOwnFrame) {
 TEST(Content, StillWindowsGiveTheirFrameBack) {
   const Painter black = [](int, int, int, uint8_t* p) { p[0] = p[1] = p[2] = 0; };
   const Painter white = [](int, int, int, uint8_t* p) { p[0] = p[1] = p[2] = 255; };
-  for (const char* options : {"", "method=dmd", "solver=adjoint", "amplitude=first-frame",
-                              "method=dmd amplitude=first-frame", "rank=1"})
+  for (const char* options :
+       {"", "method=dmd", "solver=adjoint", "solver=qr", "solver=gram-extended",
+        "amplitude=first-frame", "method=dmd amplitude=first-frame", "rank=1"})
     for (const Painter& paint : {Painter(paint_still), black, white})
       for (int width : {1, 13})
         for (int count : {1, 2, 9}) {

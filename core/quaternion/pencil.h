@@ -1,0 +1,133 @@
+// The eigenvalue of a Hessenberg pencil that is nearest to one, with both eigenvectors.
+#pragma once
+
+#include <optional>
+
+#include "core/quaternion/arnoldi.h"
+#include "core/quaternion/hessenberg.h"
+
+namespace qdmd {
+
+// H v = B v lambda with H upper Hessenberg, B upper triangular with a non-zero diagonal, both
+// size x size. Shift and invert at the real shift 1: the operator (H - B)^-1 B has the eigenvalues
+// 1 / (lambda - 1), so that Arnoldi's method (inverse iteration that remembers its steps) finds
+// those next to 1 first. H - B is factorized once; a step is O(size^2).
+template <typename Real>
+class Pencil {
+ public:
+  using Column = std::vector<Quaternion<Real>>;
+
+  Pencil(const QuaternionMatrix<Real>& h, const QuaternionMatrix<Real>& b)
+      : b_(b), shifted_(h - b), size_(h.rows()) {
+    const Real scale = h.norm() + b.norm();
+    shifted_.raise_pivots(
+        std::max(std::numeric_limits<Real>::epsilon() * scale, std::numeric_limits<Real>::min()));
+  }
+
+  // The eigenpair with the smallest |ln lambda|, |v| = 1. Empty where the nearest eigenvalues are
+  // so crowded (or so defective) that kMaxSteps steps cannot tell them apart: take the Schur form.
+  std::optional<RitzPair<Real>> nearest() const {
+    using std::abs, std::log;
+    Arnoldi<Real, Forward> space(Forward{this}, size_);
+    while (!space.complete() && space.dimension() < kMaxSteps) {
+      if (!space.step()) return std::nullopt;
+      if (!space.complete() && space.dimension() % kStepsPerCheck != 0) continue;
+      const auto ritz = space.ritz();
+      if (!ritz.converged) return std::nullopt;
+      // Candidates are the dominant Ritz values that have settled.
+      size_t settled = 0;
+      while (settled < ritz.values.size() &&
+             !(ritz.residuals[settled] > tolerance() * abs(ritz.values[settled])))
+        ++settled;
+      if (settled == 0) continue;
+      size_t best = 0;
+      Real nearest = std::numeric_limits<Real>::max();
+      for (size_t k = 0; k < settled; ++k) {
+        if (!(abs(ritz.values[k]) > Real(0))) continue;
+        const Real distance = qdmd::log(Quaternion<Real>(eigenvalue(ritz.values[k]))).norm();
+        if (distance < nearest) nearest = distance, best = k;
+      }
+      if (!space.complete()) {
+        // |lambda - 1| >= d implies |ln lambda| >= ln(1 + d): nothing beyond the first unsettled
+        // value can be nearer. Half of its residual's room is left for what is not seen yet.
+        if (settled == ritz.values.size()) continue;
+        const Real reach = abs(ritz.values[settled]) + Real(2) * ritz.residuals[settled];
+        if (!(nearest < log(Real(1) + Real(1) / reach))) continue;
+      }
+      return polished(space.combine(ritz.coordinates[best]));
+    }
+    return std::nullopt;
+  }
+
+  // u with u^H H = lambda' u^H B for a lambda' of the class of `lambda`, which nearest() found.
+  std::optional<Column> left_vector(const std::complex<Real>& lambda) const {
+    using std::abs;
+    const std::complex<Real> target = standard(Quaternion<Real>(lambda - Real(1)).inverse());
+    Arnoldi<Real, Backward> space(Backward{this}, size_);
+    while (!space.complete() && space.dimension() < kMaxSteps) {
+      if (!space.step()) return std::nullopt;
+      if (!space.complete() && space.dimension() % kStepsPerCheck != 0) continue;
+      const auto ritz = space.ritz();
+      if (!ritz.converged) return std::nullopt;
+      size_t best = 0;
+      for (size_t k = 1; k < ritz.values.size(); ++k)
+        if (abs(ritz.values[k] - target) < abs(ritz.values[best] - target)) best = k;
+      if (space.complete() || !(ritz.residuals[best] > tolerance() * abs(ritz.values[best])))
+        return space.combine(ritz.coordinates[best]);
+    }
+    return std::nullopt;
+  }
+
+  Column times_b(const Column& x) const { return multiply_upper(b_, x); }
+
+ private:
+  static constexpr Eigen::Index kMaxSteps = 60, kStepsPerCheck = 4;
+  static Real tolerance() { return Real(16) * std::numeric_limits<Real>::epsilon(); }
+
+  struct Forward {
+    const Pencil* pencil;
+    Column operator()(const Column& x) const {
+      return pencil->shifted_.solve(multiply_upper(pencil->b_, x));
+    }
+  };
+  struct Backward {
+    const Pencil* pencil;
+    Column operator()(const Column& x) const {
+      return pencil->shifted_.solve_adjoint(multiply_upper_adjoint(pencil->b_, x));
+    }
+  };
+
+  // The standard member (imaginary part >= 0) of a class.
+  static std::complex<Real> standard(const Quaternion<Real>& q) { return {q.w, q.vector_norm()}; }
+  // lambda for the operator's eigenvalue mu, in its own class.
+  static std::complex<Real> eigenvalue(const std::complex<Real>& mu) {
+    return standard(Quaternion<Real>(Real(1)) + Quaternion<Real>(mu).inverse());
+  }
+
+  // One more step of inverse iteration, and its Rayleigh quotient.
+  std::optional<RitzPair<Real>> polished(Column v) const {
+    using Space = Arnoldi<Real, Forward>;
+    Quaternion<Real> mu;
+    for (int pass = 0; pass < 2; ++pass) {
+      Column w = Forward{this}(v);
+      mu = Space::dot(v, w);
+      const Real length = Space::norm(w);
+      if (!(length > Real(0)) || !(length <= std::numeric_limits<Real>::max())) return std::nullopt;
+      // v keeps its own phase: mu belongs to it.
+      if (pass == 0) {
+        Space::scale(w, Real(1) / length);
+        v = std::move(w);
+      }
+    }
+    const Quaternion<Real> lambda = Quaternion<Real>(Real(1)) + mu.inverse();
+    const Quaternion<Real> turn = standardizing_rotation(lambda);
+    for (auto& q : v) q = q * turn;
+    return RitzPair<Real>{standard(lambda), std::move(v)};
+  }
+
+  ScalarGrid<Real> b_;
+  HessenbergQr<Real> shifted_;
+  Eigen::Index size_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,80 @@
+// Singular value decomposition of quaternion matrices.
+#pragma once
+
+#include <Eigen/SVD>
+
+#include "core/quaternion/householder.h"
+
+namespace qdmd {
+
+// M = U diag(values) V^H: u is rows x k, v is cols x k, both with orthonormal columns,
+// k = min(rows, cols), values in decreasing order.
+template <typename Real>
+struct Svd {
+  Eigen::Matrix<Real, Eigen::Dynamic, 1> values;
+  QuaternionMatrix<Real> u, v;
+};
+
+// Quaternion Householder reduction to a bidiagonal matrix, made real by unit quaternions; the real
+// problem is Eigen's. Nothing is squared: small singular values are good to epsilon times the
+// largest. Repeated ones need no pairing of columns, as the complex adjoint's do.
+template <typename Real>
+Svd<Real> svd(QuaternionMatrix<Real> m) {
+  using Index = Eigen::Index;
+  using RealMatrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+  using Complex = std::complex<Real>;
+  const Index rows = m.rows(), cols = m.cols();
+  if (rows < cols) {
+    Svd<Real> transposed = svd(m.conjugate_transpose());
+    std::swap(transposed.u, transposed.v);
+    return transposed;
+  }
+  Svd<Real> result;
+  if (cols == 0) {
+    result.u = QuaternionMatrix<Real>(rows, 0);
+    result.v = QuaternionMatrix<Real>(0, 0);
+    return result;
+  }
+
+  const int exponent = m.normalize();
+  std::vector<Reflector<Real>> left, right;
+  for (Index k = 0; k < cols; ++k) {
+    left.push_back(make_reflector(m.block(k, k, rows - k, 1)));
+    apply_left(left.back(), m, k, k + 1, cols - k - 1);
+    m.set(k, k, left.back().alpha);
+    if (k + 2 >= cols) continue;
+    right.push_back(make_reflector(m.block(k, k + 1, 1, cols - k - 1).conjugate_transpose()));
+    apply_right(right.back(), m, k + 1, rows - k - 1, k + 1);
+    m.set(k, k + 1, right.back().alpha.conj());
+  }
+
+  // Unit quaternions make the two diagonals real, from the top left on.
+  RealMatrix bidiagonal = RealMatrix::Zero(cols, cols);
+  QuaternionMatrix<Real> u(rows, cols), v = QuaternionMatrix<Real>::identity(cols);
+  Quaternion<Real> column_phase(Real(1));
+  for (Index k = 0; k < cols; ++k) {
+    v.set(k, k, column_phase);
+    const Quaternion<Real> on = m.get(k, k) * column_phase, row_phase = on.unit();
+    u.set(k, k, row_phase);
+    bidiagonal(k, k) = on.norm();
+    if (k + 1 == cols) break;
+    const Quaternion<Real> above = row_phase.conj() * m.get(k, k + 1);
+    bidiagonal(k, k + 1) = above.norm();
+    column_phase = above.unit().conj();
+  }
+  for (Index k = cols; k-- > 0;) apply_left(left[static_cast<size_t>(k)], u, k, 0, cols);
+  for (size_t k = right.size(); k-- > 0;)
+    apply_left(right[k], v, static_cast<Index>(k) + 1, 0, cols);
+
+  const Eigen::BDCSVD<RealMatrix> real(bidiagonal, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  using std::ldexp;
+  result.values = real.singularValues().unaryExpr(
+      [exponent](const Real& value) { return Real(ldexp(value, exponent)); });
+  const auto turn_u = real.matrixU().template cast<Complex>().eval();
+  const auto turn_v = real.matrixV().template cast<Complex>().eval();
+  result.u = {u.a * turn_u, u.b * turn_u};
+  result.v = {v.a * turn_v, v.b * turn_v};
+  return result;
+}
+
+}  // namespace qdmd
