@@ -1,0 +1,23 @@
+// Named windows that are hard to decompose.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/gram/window.h"
+
+namespace qdmd::stability {
+
+struct HardCase {
+  std::string name;
+  std::string hard;  // what is hard about it, one clause
+  std::function<Window()> make;
+  // Too many pixels for Solver::adjoint, whose memory is some hundred bytes a pixel and frame.
+  bool large = false;
+};
+
+// Always the same windows, bit for bit.
+const std::vector<HardCase>& hard_cases();
+
+}  // namespace qdmd::stability
