@@ -109,6 +109,7 @@ enum {
   PROP_SOLVER,
   PROP_FOREGROUND_THRESHOLD,
   PROP_MAX_MEMORY,
+  PROP_N_THREADS,
   PROP_STATS
 };
 
@@ -173,6 +174,9 @@ static void gst_qdmd_background_set_property(GObject* object, guint id, const GV
     case PROP_MAX_MEMORY:
       settings.engine.max_memory = g_value_get_uint64(value);
       break;
+    case PROP_N_THREADS:
+      settings.engine.threads = int(g_value_get_uint(value));
+      break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
       break;
@@ -215,6 +219,9 @@ static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* 
       break;
     case PROP_MAX_MEMORY:
       g_value_set_uint64(value, settings.engine.max_memory);
+      break;
+    case PROP_N_THREADS:
+      g_value_set_uint(value, guint(settings.engine.threads));
       break;
     case PROP_STATS:
       g_value_take_boxed(value, make_stats(priv));
@@ -580,6 +587,11 @@ static void install_properties(GObjectClass* object_class) {
           g_param_spec_uint64("max-memory", "Maximum memory",
                               "Bytes that the window may take; a larger one is an error", 0,
                               G_MAXUINT64, engine.max_memory, at_start));
+  install(PROP_N_THREADS,
+          g_param_spec_uint("n-threads", "Number of threads",
+                            "Threads that compute the Gram matrix (0: one for each core); the "
+                            "pictures are the same for any number",
+                            0, guint(EngineOptions::kMaxThreads), guint(engine.threads), at_start));
   install(PROP_STATS,
           g_param_spec_boxed("stats", "Statistics",
                              "Counters, and facts about the newest solve: rank, lambda (real and "

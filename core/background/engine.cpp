@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <thread>
 
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
@@ -16,6 +17,13 @@ constexpr int kGramGroup = 4;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+int thread_count(const EngineOptions& options) {
+  if (options.threads > 0) return options.threads;
+  // Zero where the system does not tell.
+  return static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1,
+                                               unsigned{EngineOptions::kMaxThreads}));
 }
 
 void copy_plane(const uint8_t* from, const ImageView& frame, uint8_t* to) {
@@ -35,6 +43,8 @@ Status check(const EngineOptions& options, int width, int height) {
       !(options.foreground_threshold >= 0))
     return {Code::invalid_options,
             "rank, omega-threshold and foreground-threshold must not be negative"};
+  if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
+    return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
   const std::string frames = std::to_string(options.window_size) + " frames of " +
                              std::to_string(width) + "x" + std::to_string(height);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
@@ -68,7 +78,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   // The old window goes first: two at once would break the promise of max-memory.
   window_ = Window();
   window_ = Window(options.window_size, pixels);
-  gram_ = SlidingGram(options.window_size);
+  gram_ = SlidingGram(options.window_size, thread_count(options));
   alpha_ = AlphaStore(options.window_size);
   report_ = SolveReport();
   solves_ = 0;

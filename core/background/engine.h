@@ -16,8 +16,9 @@ struct EngineOptions {
   DmdOptions dmd;
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window may take
+  int threads = 0;  // for the Gram matrix, up to kMaxThreads; 0: all cores. Changes no result
 
-  static constexpr int kMinWindow = 2, kMaxWindow = 2048;
+  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = 256;
 };
 
 // Why a call was refused. The message is a sentence for the user that says what to change.

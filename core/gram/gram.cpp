@@ -2,12 +2,14 @@
 
 #include <vector>
 
-#include "core/gram/kernel.h"
+#include "core/gram/parallel.h"
 
 namespace qdmd {
 
-SlidingGram::SlidingGram(int capacity)
-    : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)) {}
+SlidingGram::SlidingGram(int capacity, int threads, const Kernel& kernel)
+    : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)),
+      threads_(threads),
+      kernel_(kernel) {}
 
 void SlidingGram::add_newest(const Window& window, int count, int span) {
   const int size = window.size();
@@ -19,8 +21,8 @@ void SlidingGram::add_newest(const Window& window, int count, int span) {
   Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products(
       kChannels * count, kChannels * span);
   const auto rows = static_cast<size_t>(kChannels * count);
-  dot_products(planes.data() + planes.size() - rows, rows, planes.data(), planes.size(),
-               window.plane_size(), products.data());
+  parallel_dot_products(kernel_, threads_, planes.data() + planes.size() - rows, rows,
+                        planes.data(), planes.size(), window.plane_size(), products.data());
   for (int k = 0; k < count; ++k) {
     const int added = window.slot(size - count + k);
     for (int t = 0; t < span; ++t) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "core/gram/kernel.h"
 #include "core/gram/window.h"
 #include "core/quaternion/matrix.h"
 
@@ -16,7 +17,8 @@ using IntegerMatrix = Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic>;
 class SlidingGram {
  public:
   SlidingGram() = default;
-  explicit SlidingGram(int capacity);
+  // Up to `threads` (at least 1) threads compute; their number does not change the bits.
+  explicit SlidingGram(int capacity, int threads = 1, const Kernel& kernel = kernels().front());
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), 9 span products per pixel and snapshot. Several at once read the
@@ -28,6 +30,8 @@ class SlidingGram {
 
  private:
   IntegerMatrix by_slot_;
+  int threads_ = 1;
+  Kernel kernel_ = kernels().front();
 };
 
 // G_st = x_s^H x_t, m x m, from the identity conj(x) y = x . y - x cross y for pure quaternions.

@@ -29,10 +29,8 @@ void block_dots(const std::array<WideRow, kRows>& rows, const uint8_t* col, size
   sums[2] = sum2;
 }
 
-}  // namespace
-
-void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                  size_t col_count, size_t length, int64_t* out) {
+void widened(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+             size_t col_count, size_t length, int64_t* out) noexcept {
   std::fill(out, out + row_count * col_count, int64_t{0});
   std::array<WideRow, kRows> wide{};
   for (size_t start = 0; start < length; start += kBlock) {
@@ -48,6 +46,28 @@ void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* c
       }
     }
   }
+}
+
+// The definition, without blocks: what the other kernels are compared with.
+void reference(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+               size_t col_count, size_t length, int64_t* out) noexcept {
+  for (size_t i = 0; i < row_count; ++i)
+    for (size_t j = 0; j < col_count; ++j) {
+      int64_t sum = 0;
+      for (size_t p = 0; p < length; ++p) sum += int64_t{rows[i][p]} * cols[j][p];
+      out[i * col_count + j] = sum;
+    }
+}
+
+constexpr Kernel kKernels[] = {{"widened", widened}, {"reference", reference}};
+
+}  // namespace
+
+std::span<const Kernel> kernels() { return kKernels; }
+
+void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+                  size_t col_count, size_t length, int64_t* out) noexcept {
+  kernels().front().dot_products(rows, row_count, cols, col_count, length, out);
 }
 
 }  // namespace qdmd

@@ -3,12 +3,25 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace qdmd {
 
-// out[i * col_count + j] = sum over p < length of rows[i][p] * cols[j][p], exactly.
-// `length` may be anything up to 2^46; the sums are integers below 2^63.
+// One way to compute inner products. All give the same bits.
+struct Kernel {
+  const char* name;
+  // out[i * col_count + j] = sum over p < length of rows[i][p] * cols[j][p], exactly.
+  // `length` may be anything up to 2^46; the sums are integers below 2^63. Threads run it, so it
+  // neither throws nor keeps anything between calls.
+  void (*dot_products)(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+                       size_t col_count, size_t length, int64_t* out) noexcept;
+};
+
+// Every kernel that this machine can run, the fastest first.
+std::span<const Kernel> kernels();
+
+// Kernel::dot_products of the fastest kernel.
 void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                  size_t col_count, size_t length, int64_t* out);
+                  size_t col_count, size_t length, int64_t* out) noexcept;
 
 }  // namespace qdmd

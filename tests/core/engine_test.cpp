@@ -191,6 +191,10 @@ TEST(EngineStatus, RangesOfTheOptions) {
     EXPECT_EQ(configured([&](Options& o) { o.dmd.omega_threshold = value; }), kOk);
     EXPECT_EQ(configured([&](Options& o) { o.foreground_threshold = value; }), kOk);
   }
+  for (int threads : {-1, 257})
+    EXPECT_EQ(configured([&](Options& o) { o.threads = threads; }), kInvalid) << threads;
+  for (int threads : {0, 1, 2, 256})
+    EXPECT_EQ(configured([&](Options& o) { o.threads = threads; }), kOk) << threads;
   EXPECT_EQ(configured([&](Options& o) { o.dmd.rank = -1; }), kInvalid);
   EXPECT_EQ(configured([&](Options& o) { o.dmd.rank = 100000; }), kOk);
   for (int size : {0, -1}) {

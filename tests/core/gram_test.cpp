@@ -22,15 +22,17 @@ void expect_exact(const Planes& rows, const Planes& cols, size_t length) {
   std::vector<const uint8_t*> row_pointers, col_pointers;
   for (const auto& row : rows) row_pointers.push_back(row.data());
   for (const auto& col : cols) col_pointers.push_back(col.data());
-  // Rubbish in `out` has to be overwritten, and nothing behind it touched.
-  std::vector<int64_t> out(rows.size() * cols.size() + 1, -12345);
-  dot_products(row_pointers.data(), rows.size(), col_pointers.data(), cols.size(), length,
-               out.data());
-  for (size_t i = 0; i < rows.size(); ++i)
-    for (size_t j = 0; j < cols.size(); ++j)
-      EXPECT_EQ(out[i * cols.size() + j], naive_dot(rows[i], cols[j]))
-          << "length " << length << " row " << i << " col " << j;
-  EXPECT_EQ(out.back(), -12345);
+  for (const Kernel& kernel : kernels()) {
+    // Rubbish in `out` has to be overwritten, and nothing behind it touched.
+    std::vector<int64_t> out(rows.size() * cols.size() + 1, -12345);
+    kernel.dot_products(row_pointers.data(), rows.size(), col_pointers.data(), cols.size(), length,
+                        out.data());
+    for (size_t i = 0; i < rows.size(); ++i)
+      for (size_t j = 0; j < cols.size(); ++j)
+        EXPECT_EQ(out[i * cols.size() + j], naive_dot(rows[i], cols[j]))
+            << kernel.name << " length " << length << " row " << i << " col " << j;
+    EXPECT_EQ(out.back(), -12345) << kernel.name;
+  }
 }
 
 // Around vector widths, around blocks of 4096 and 8192 pixels, and several blocks.
@@ -63,10 +65,12 @@ TEST(DotProducts, SumsBeyond32Bits) {
   // 255^2 * 70000 = 4.55e9 does not fit 32 bits, signed or unsigned.
   const std::vector<uint8_t> white(70000, 255);
   const uint8_t* pointer = white.data();
-  int64_t out = 0;
-  dot_products(&pointer, 1, &pointer, 1, white.size(), &out);
-  EXPECT_EQ(out, int64_t{255} * 255 * 70000);
-  EXPECT_GT(out, int64_t{UINT32_MAX});
+  for (const Kernel& kernel : kernels()) {
+    int64_t out = 0;
+    kernel.dot_products(&pointer, 1, &pointer, 1, white.size(), &out);
+    EXPECT_EQ(out, int64_t{255} * 255 * 70000) << kernel.name;
+    EXPECT_GT(out, int64_t{UINT32_MAX}) << kernel.name;
+  }
 }
 
 TEST(DotProducts, EveryShapeOfTile) {
@@ -91,9 +95,11 @@ TEST(DotProducts, UnalignedPlanes) {
   for (ptrdiff_t offset = 0; offset < 64; offset += 7) {
     const uint8_t* row = x.data() + offset;
     const uint8_t* col = y.data() + 63 - offset;
-    int64_t out = 0;
-    dot_products(&row, 1, &col, 1, 300, &out);
-    EXPECT_EQ(out, naive_dot({row, row + 300}, {col, col + 300}));
+    for (const Kernel& kernel : kernels()) {
+      int64_t out = 0;
+      kernel.dot_products(&row, 1, &col, 1, 300, &out);
+      EXPECT_EQ(out, naive_dot({row, row + 300}, {col, col + 300})) << kernel.name;
+    }
   }
 }
 

@@ -216,13 +216,15 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   gst_util_set_object_arg(G_OBJECT(element), "solver", "adjoint");
   gst_util_set_object_arg(G_OBJECT(element), "foreground-threshold", "12.5");
   gst_util_set_object_arg(G_OBJECT(element), "max-memory", "5000000000");
+  gst_util_set_object_arg(G_OBJECT(element), "n-threads", "7");
   gint output, method, amplitude, solver, mode;
-  guint window, rank;
+  guint window, rank, threads;
   gdouble omega, threshold;
   guint64 memory;
   g_object_get(element, "output", &output, "method", &method, "amplitude", &amplitude, "solver",
                &solver, "mode", &mode, "window-size", &window, "rank", &rank, "omega-threshold",
-               &omega, "foreground-threshold", &threshold, "max-memory", &memory, nullptr);
+               &omega, "foreground-threshold", &threshold, "max-memory", &memory, "n-threads",
+               &threads, nullptr);
   EXPECT_EQ(3, output);
   EXPECT_EQ(1, method);
   EXPECT_EQ(1, amplitude);
@@ -233,6 +235,7 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   EXPECT_EQ(0.25, omega);
   EXPECT_EQ(12.5, threshold);
   EXPECT_EQ(5000000000u, memory);
+  EXPECT_EQ(7u, threads);
 
   guint count = 0;
   GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element), &count);
