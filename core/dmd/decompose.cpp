@@ -19,20 +19,6 @@ QuaternionMatrixd pixels_of(const Window& window) {
   return x;
 }
 
-BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram,
-                                 const DmdOptions& options) {
-  switch (options.solver) {
-    case Solver::qr:
-      return qdmd_from_qr(window, options);
-    case Solver::adjoint:
-      return qdmd_from_adjoint(pixels_of(window), options);
-    case Solver::gram:
-    case Solver::gram_extended:
-      break;
-  }
-  return qdmd_from_gram(quaternion_gram(gram), options);
-}
-
 Decomposition single_snapshot() {
   Decomposition result;
   result.background = TemporalModel(1);
@@ -61,6 +47,20 @@ Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& op
 }
 
 }  // namespace
+
+BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram,
+                                 const DmdOptions& options) {
+  switch (options.solver) {
+    case Solver::qr:
+      return qdmd_from_qr(window, options);
+    case Solver::adjoint:
+      return qdmd_from_adjoint(pixels_of(window), options);
+    case Solver::gram:
+    case Solver::gram_extended:
+      break;
+  }
+  return qdmd_from_gram(quaternion_gram(gram), options);
+}
 
 Decomposition decompose(const Window& window, const IntegerMatrix& gram,
                         const DmdOptions& options) {

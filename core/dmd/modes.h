@@ -152,19 +152,19 @@ void fit_to_window(QuaternionModes<Real>* modes, const QuaternionMatrix<Real>& p
                                                   phi_h * phi, phi_h * x);
 }
 
-// b = Phi^+ x_1 (the paper), minimum-norm least squares on the complex adjoint. phi: k x r,
-// x: k x 1.
+// The b (r x 1) that minimizes |M b - x|, the one of least norm among equals: QR factorization with
+// column pivoting of the complex adjoint, columns scaled to norm one. M: k x r, x: k x 1. With the
+// modes Phi for M and the first snapshot for x these are the paper's amplitudes Phi^+ x_1.
 template <typename Real>
-QuaternionMatrix<Real> first_frame_amplitudes(const QuaternionMatrix<Real>& phi,
-                                              const QuaternionMatrix<Real>& x) {
-  using std::sqrt;
+QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,
+                                     const QuaternionMatrix<Real>& x) {
   // Unit columns first, so that small modes are not taken for dependent ones.
-  Eigen::Matrix<Real, Eigen::Dynamic, 1> scale(phi.cols());
-  for (Eigen::Index p = 0; p < phi.cols(); ++p) {
-    const Real size = phi.col(p).norm();
+  Eigen::Matrix<Real, Eigen::Dynamic, 1> scale(m.cols());
+  for (Eigen::Index p = 0; p < m.cols(); ++p) {
+    const Real size = m.col(p).norm();
     scale(p) = size > Real(0) ? Real(Real(1) / size) : Real(0);
   }
-  const auto chi = phi.scale_cols(scale).adjoint();
+  const auto chi = m.scale_cols(scale).adjoint();
   typename QuaternionMatrix<Real>::ComplexMatrix rhs(2 * x.rows(), 1);
   rhs << x.a, -x.b.conjugate();
   const typename QuaternionMatrix<Real>::ComplexMatrix solution =

@@ -108,7 +108,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, background, x);
   } else {
-    const auto b = first_frame_amplitudes<double>(phi, x.col(0));
+    const auto b = least_squares<double>(phi, x.col(0));
     result.amplitudes = QuaternionMatrixd(modes, 1);
     for (Index p = 0; p < modes; ++p)
       result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));

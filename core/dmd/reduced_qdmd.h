@@ -40,24 +40,73 @@ struct Projection {
   QuaternionMatrix<Real> coefficients, q_tilde;
 };
 
-// One mode for amplitude=window, without the other eigenvectors. Empty where the Schur form is
-// needed.
+// What an eigenpair's residual may be for it to count as found.
 template <typename Real>
-std::optional<QuaternionModes<Real>> nearest_mode(const Projection<Real>& projection,
+Real residual_limit(Eigen::Index size) {
+  return Real(50 * static_cast<double>(size)) * std::numeric_limits<Real>::epsilon();
+}
+
+// The paper's amplitude of one mode without the others: b = (y w)^-1 y a for the left eigenvector y
+// (a row) and the right one w in coordinates in which a = argmin |Y C a - x_1|. Empty where y and w
+// are orthogonal to working accuracy, as those of a defective eigenvalue are.
+template <typename Real>
+std::optional<Quaternion<Real>> amplitude_from_left_vector(const QuaternionMatrix<Real>& y,
+                                                           const QuaternionMatrix<Real>& w,
+                                                           const QuaternionMatrix<Real>& a) {
+  const Quaternion<Real> share = (y * w).get(0, 0);
+  if (!(share.norm() > residual_limit<Real>(w.rows()) * y.norm() * w.norm())) return std::nullopt;
+  return share.inverse() * (y * a).get(0, 0);
+}
+
+// The nearest mode without the Schur form: of the Hessenberg pencil h, b, in whose coordinates C
+// turns into `coefficients` (m - 1 x size). `first_frame`: argmin |Y C a - x_1| in the same
+// coordinates, for Amplitude::first_frame only. Empty where the Schur form is needed.
+template <typename Real>
+std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& h,
+                                                  const QuaternionMatrix<Real>& b,
+                                                  const QuaternionMatrix<Real>* coefficients,
+                                                  const QuaternionMatrix<Real>* first_frame,
                                                   const SnapshotFactor<Real>& factor) {
-  const Eigen::Index m = factor.r.cols(), rank = projection.q_tilde.rows();
-  QuaternionMatrix<Real> h = projection.q_tilde;
-  const auto basis = reduce_to_hessenberg(h);
-  const Pencil<Real> pencil(h, QuaternionMatrix<Real>::identity(rank));
+  const Pencil<Real> pencil(h, b);
   const auto pair = pencil.nearest();
   if (!pair) return std::nullopt;
-  const auto w = basis * to_matrix(pair->vector);
-  QuaternionModes<Real> result(m, 1);
+  const auto v = to_matrix(pair->vector);
+  auto expected = b * v;
+  expected.scale_col(0, Quaternion<Real>(pair->value));
+  const Real residual =
+      (h * v - expected).norm() / (h.norm() + Quaternion<Real>(pair->value).norm() * b.norm());
+  if (!(residual <= residual_limit<Real>(h.rows()))) return std::nullopt;
+  QuaternionModes<Real> result(factor.r.cols(), 1);
   result.eigenvalues(0) = pair->value;
-  set_combination(&result, 0, projection.coefficients * w);
-  fit_to_window(&result, factor.r * result.combination, factor.r);
-  describe_nearest(&result, eigenpair_residual(projection.q_tilde, w, pair->value));
+  set_combination(&result, 0, coefficients ? *coefficients * v : v);
+  if (first_frame) {
+    const auto u = pencil.left_vector(pair->value);
+    if (!u) return std::nullopt;
+    const auto amplitude =
+        amplitude_from_left_vector<Real>(to_matrix(*u).conjugate_transpose() * b, v, *first_frame);
+    if (!amplitude) return std::nullopt;
+    result.amplitudes.set(0, 0, *amplitude);
+  } else {
+    fit_to_window(&result, factor.r * result.combination, factor.r);
+  }
+  describe_nearest(&result, residual);
   return result;
+}
+
+// The same for a projection, whose Q~ is reduced to Hessenberg form first.
+template <typename Real>
+std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection<Real>& projection,
+                                                                const SnapshotFactor<Real>& factor,
+                                                                Amplitude amplitude) {
+  const Eigen::Index later = factor.r.cols() - 1, rank = projection.q_tilde.rows();
+  QuaternionMatrix<Real> h = projection.q_tilde;
+  const auto basis = reduce_to_hessenberg(h);
+  const auto coefficients = projection.coefficients * basis;
+  const auto identity = QuaternionMatrix<Real>::identity(rank);
+  if (amplitude == Amplitude::window)
+    return nearest_mode<Real>(h, identity, &coefficients, nullptr, factor);
+  const auto a = least_squares<Real>(factor.r.right_cols(later) * coefficients, factor.r.col(0));
+  return nearest_mode<Real>(h, identity, &coefficients, &a, factor);
 }
 
 // All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
@@ -70,54 +119,40 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   if (!form.converged) return std::nullopt;
   const ComplexVector<Real> eigenvalues = form.eigenvalues();
   const auto chosen = select_background<Real>(eigenvalues, options.omega_threshold);
-  const auto eigenvector = [&](Eigen::Index k) {
-    return form.q * triangular_eigenvector(form.t, k);
-  };
+  const auto coefficients = projection.coefficients * form.q;
 
   // Step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
   QuaternionModes<Real> result(m, static_cast<Eigen::Index>(chosen.size()));
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p) {
     const Eigen::Index k = chosen[static_cast<size_t>(p)];
-    const auto w = eigenvector(k);
+    const auto w = triangular_eigenvector(form.t, k);
     result.eigenvalues(p) = eigenvalues(k);
-    set_combination(&result, p, projection.coefficients * w);
+    set_combination(&result, p, coefficients * w);
     if (p == 0)
-      describe_nearest(&result, eigenpair_residual(projection.q_tilde, w, eigenvalues(k)));
+      describe_nearest(&result,
+                       eigenpair_residual<Real>(projection.q_tilde, form.q * w, eigenvalues(k)));
   }
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, factor.r * result.combination, factor.r);
     return result;
   }
+  if (chosen.size() == 1) {
+    const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0));
+    const auto b = amplitude_from_left_vector<Real>(triangular_left_eigenvector(form.t, chosen[0]),
+                                                    triangular_eigenvector(form.t, chosen[0]), a);
+    if (b) {
+      result.amplitudes.set(0, 0, *b);
+      return result;
+    }
+  }
+  // Several modes that nearly coincide share the first snapshot: only together are they stable.
   QuaternionModes<Real> all(m, rank);
   for (Eigen::Index k = 0; k < rank; ++k)
-    set_combination(&all, k, projection.coefficients * eigenvector(k));
-  const auto b = first_frame_amplitudes<Real>(factor.r * all.combination, factor.r.col(0));
+    set_combination(&all, k, coefficients * triangular_eigenvector(form.t, k));
+  const auto b = least_squares<Real>(factor.r * all.combination, factor.r.col(0));
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p)
     result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   return result;
-}
-
-// b_p = (u^H R11 v)^-1 u^H R11 a with a = argmin |R(:, 2..m) a - R(:, 1)|: the paper's amplitude of
-// the mode Y v from its left eigenvector u, where the snapshots x_2 .. x_m are independent.
-template <typename Real>
-std::optional<Quaternion<Real>> first_frame_amplitude(const Pencil<Real>& pencil,
-                                                      const RitzPair<Real>& pair,
-                                                      const SnapshotFactor<Real>& factor) {
-  using Space = std::vector<Quaternion<Real>>;
-  const HessenbergQr<Real> later(factor.r.right_cols(factor.r.cols() - 1));
-  if (!(later.smallest_pivot() > factor.tolerance * factor.r.norm())) return std::nullopt;
-  const auto u = pencil.left_vector(pair.value);
-  if (!u) return std::nullopt;
-  const auto share = [&](const Space& x) {
-    Quaternion<Real> sum;
-    const Space bx = pencil.times_b(x);
-    for (size_t k = 0; k < bx.size(); ++k) sum += (*u)[k].conj() * bx[k];
-    return sum;
-  };
-  const Quaternion<Real> on_mode = share(pair.vector);
-  // A (nearly) defective eigenvalue: left and right vector are orthogonal.
-  if (!(on_mode.norm() > factor.tolerance * factor.r.norm())) return std::nullopt;
-  return on_mode.inverse() * share(later.solve(to_column(factor.r.col(0))));
 }
 
 // The nearest mode at full rank, from the Hessenberg pencil H v = R11 v lambda: no inverse, no
@@ -127,27 +162,12 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_pencil(const QuaternionMatr
                                                             const QuaternionMatrix<Real>& r11,
                                                             const SnapshotFactor<Real>& factor,
                                                             Amplitude amplitude) {
-  const Eigen::Index m = factor.r.cols();
-  const Pencil<Real> pencil(h, r11);
-  const auto pair = pencil.nearest();
-  if (!pair) return std::nullopt;
-  const auto v = to_matrix(pair->vector);
-  const auto bv = to_matrix(pencil.times_b(pair->vector));
-  QuaternionModes<Real> result(m, 1);
-  result.eigenvalues(0) = pair->value;
-  set_combination(&result, 0, v);
-  if (amplitude == Amplitude::window) {
-    fit_to_window(&result, factor.r.right_cols(m - 1) * v, factor.r);
-  } else {
-    const auto b = first_frame_amplitude(pencil, *pair, factor);
-    if (!b) return std::nullopt;
-    result.amplitudes.set(0, 0, *b);
-  }
-  auto expected = bv;
-  expected.scale_col(0, Quaternion<Real>(pair->value));
-  const Real size = h.norm() + Quaternion<Real>(pair->value).norm() * r11.norm();
-  describe_nearest(&result, Real((h * v - expected).norm() / size));
-  return result;
+  if (amplitude == Amplitude::window) return nearest_mode<Real>(h, r11, nullptr, nullptr, factor);
+  // Y is Hessenberg in these coordinates. Dependent snapshots x_2 .. x_m want least norm.
+  const HessenbergQr<Real> later(factor.r.right_cols(h.cols()));
+  if (!(later.smallest_pivot() > factor.tolerance * factor.r.norm())) return std::nullopt;
+  const auto a = to_matrix(later.solve(to_column(factor.r.col(0))));
+  return nearest_mode<Real>(h, r11, nullptr, &a, factor);
 }
 
 template <typename Real>
@@ -184,7 +204,7 @@ PastSpectrum<Real> past_spectrum(const SnapshotFactor<Real>& factor, Eigen::Inde
   const auto past = factor.r.left_cols(factor.r.cols() - 1);
   PastSpectrum<Real> result;
   Eigen::Matrix<Real, Eigen::Dynamic, 1> values;
-  QuaternionMatrix<Real> u, v;
+  QuaternionMatrix<Real> u;
   if (factor.squared) {
     // X X^H in the basis of R.
     auto eigen = hermitian_eigen(past * past.conjugate_transpose());
@@ -194,17 +214,16 @@ PastSpectrum<Real> past_spectrum(const SnapshotFactor<Real>& factor, Eigen::Inde
     auto singular = svd(past);
     values = std::move(singular.values);
     u = std::move(singular.u);
-    v = std::move(singular.v);
   }
   Eigen::Index rank = 0;
   while (rank < values.size() && values(rank) > factor.tolerance * values(0)) ++rank;
   if (limit > 0) rank = std::min(rank, limit);
   result.sigma = values.head(rank);
   result.u = u.left_cols(rank);
-  const Eigen::Matrix<Real, Eigen::Dynamic, 1> inverse = result.sigma.cwiseInverse();
-  result.v_over_s = factor.squared
-                        ? past.conjugate_transpose() * result.u.scale_cols(inverse.cwiseAbs2())
-                        : v.left_cols(rank).scale_cols(inverse);
+  // V S^-1 = X^H U S^-2: in the row space of X to within one product's rounding, which V of a long
+  // window's decomposition is not.
+  const Eigen::Matrix<Real, Eigen::Dynamic, 1> inverse = result.sigma.cwiseInverse().cwiseAbs2();
+  result.v_over_s = past.conjugate_transpose() * result.u.scale_cols(inverse);
   return result;
 }
 
@@ -222,8 +241,8 @@ QuaternionModes<Real> projected_modes(const SnapshotFactor<Real>& factor,
         spectrum.v_over_s,
         spectrum.u.conjugate_transpose() * (factor.r.right_cols(m - 1) * spectrum.v_over_s)};
     std::optional<QuaternionModes<Real>> result;
-    if (!(options.omega_threshold > 0) && options.amplitude == Amplitude::window)
-      result = nearest_mode(projection, factor);
+    if (!(options.omega_threshold > 0))
+      result = nearest_mode_of_projection(projection, factor, options.amplitude);
     if (!result) result = modes_from_schur_form(projection, factor, options);
     if (!result) {
       // Nothing is known to bring this about; rank one needs no iteration.

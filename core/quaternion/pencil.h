@@ -78,8 +78,6 @@ class Pencil {
     return std::nullopt;
   }
 
-  Column times_b(const Column& x) const { return multiply_upper(b_, x); }
-
  private:
   static constexpr Eigen::Index kMaxSteps = 60, kStepsPerCheck = 4;
   static Real tolerance() { return Real(16) * std::numeric_limits<Real>::epsilon(); }

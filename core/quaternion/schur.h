@@ -54,14 +54,16 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
   const Real epsilon = std::numeric_limits<Real>::epsilon();
   const Real scale = m.norm();
 
-  constexpr int kIterationsPerEigenvalue = 60;
+  constexpr int kIterationsPerEigenvalue = 60, kPatience = 12;
   int iterations = 0;
   Index hi = size - 1;
   while (hi > 0) {
     Index lo = hi;
     for (; lo > 0; --lo) {
       Real local = h(lo - 1, lo - 1).norm() + h(lo, lo).norm();
-      if (!(local > Real(0))) local = scale;
+      // Small next to its neighbours keeps small eigenvalues accurate; where that never comes (a
+      // nilpotent block's diagonal vanishes too), small next to the matrix is still stable.
+      if (iterations >= kPatience || !(local > Real(0))) local = scale;
       if (!(h(lo, lo - 1).norm() > epsilon * local)) {
         h(lo, lo - 1) = Q();
         break;
@@ -173,6 +175,35 @@ QuaternionMatrix<Real> triangular_eigenvector(const QuaternionMatrix<Real>& t, E
   w.a /= length;
   w.b /= length;
   return w;
+}
+
+// Left eigenvector k of the triangular factor t: the row y (1 x size) with y T = lambda_k y, zero
+// before column k. Forward substitution, otherwise as triangular_eigenvector().
+template <typename Real>
+QuaternionMatrix<Real> triangular_left_eigenvector(const QuaternionMatrix<Real>& t,
+                                                   Eigen::Index k) {
+  using Complex = std::complex<Real>;
+  using std::abs;
+  const Eigen::Index size = t.rows();
+  QuaternionMatrix<Real> y(1, size);
+  y.a(0, k) = Complex(Real(1));
+  const Complex value = t.a(k, k);
+  const Real smallest =
+      std::max(std::numeric_limits<Real>::epsilon() * t.norm(), std::numeric_limits<Real>::min());
+  const auto safe = [&](Complex divisor) {
+    return abs(divisor) < smallest ? Complex(smallest) : divisor;
+  };
+  for (Eigen::Index i = k + 1; i < size; ++i) {
+    const auto r = y.block(0, k, 1, i - k) * t.block(k, i, i - k, 1);
+    y.a(0, i) = -r.a(0, 0) / safe(t.a(i, i) - value);
+    y.b(0, i) = -r.b(0, 0) / safe(std::conj(t.a(i, i)) - value);
+    const Real largest = std::max(abs(y.a(0, i)), abs(y.b(0, i)));
+    if (largest > Real(1) / std::numeric_limits<Real>::epsilon()) {
+      y.a /= Complex(largest);
+      y.b /= Complex(largest);
+    }
+  }
+  return y;
 }
 
 }  // namespace qdmd

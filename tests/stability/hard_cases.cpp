@@ -176,6 +176,7 @@ std::vector<HardCase> make_cases() {
   add("eigenvalues repeated", "a cycle of four pictures: i twice", [] { return disjoint(4, 9); });
   add("singular values repeated", "orthogonal frames of one length: all equal",
       [] { return disjoint(8, 16); });
+  all[all.size() - 1].repeats = all[all.size() - 2].repeats = true;
   add("nilpotent", "no frame returns: eigenvalue 0 in one Jordan block",
       [] { return disjoint(8, 8); });
   add("Jordan pair", "a linear ramp: lambda = 1 is defective", ramp);

@@ -15,6 +15,9 @@ struct HardCase {
   std::function<Window()> make;
   // Too many pixels for Solver::adjoint, whose memory is some hundred bytes a pixel and frame.
   bool large = false;
+  // Singular values or eigenvalues repeat exactly: Solver::adjoint, which takes every other column
+  // of the complex adjoint's vectors as the paper does, cannot be right.
+  bool repeats = false;
 };
 
 // Always the same windows, bit for bit.

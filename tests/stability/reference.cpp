@@ -16,6 +16,23 @@ std::complex<Decimal> to_decimal(const std::complex<double>& c) {
   return {Decimal(c.real()), Decimal(c.imag())};
 }
 
+// lambda_p^(t - reference_p)
+Quaternion<Decimal> growth(const QuaternionModes<Decimal>& modes, Eigen::Index p, Eigen::Index t) {
+  return Quaternion<Decimal>(
+      power<Decimal>(modes.eigenvalues(p), static_cast<double>(t) - modes.reference_times(p)));
+}
+
+// The coefficients of the snapshots in L(t), m x 1.
+QuaternionMatrix<Decimal> shares_at(const QuaternionModes<Decimal>& modes, Eigen::Index t) {
+  QuaternionMatrix<Decimal> shares(modes.combination.rows(), 1);
+  for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p) {
+    auto mode = modes.combination.col(p);
+    mode.scale_col(0, growth(modes, p, t) * modes.amplitudes.get(p, 0));
+    shares += mode;
+  }
+  return shares;
+}
+
 }  // namespace
 
 Reference::Reference(const IntegerMatrix& gram, Eigen::MatrixXd pixels)
@@ -77,25 +94,41 @@ Answer Reference::evaluate(const QuaternionModes<Decimal>& modes) const {
   answer.rank = modes.summary.rank;
   answer.modes = static_cast<int>(modes.eigenvalues.size());
   if (answer.modes > 0) answer.lambda = modes.eigenvalues(0);
+  Decimal largest_sum(1), largest_part(1);
   for (Eigen::Index t : {Eigen::Index{0}, m / 2, m - 1}) {
-    QuaternionMatrix<Decimal> shares(m, 1);
-    for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p) {
-      auto mode = modes.combination.col(p);
-      mode.scale_col(0,
-                     Quaternion<Decimal>(power<Decimal>(
-                         modes.eigenvalues(p), static_cast<double>(t) - modes.reference_times(p))) *
-                         modes.amplitudes.get(p, 0));
-      shares += mode;
-    }
+    const auto shares = shares_at(modes, t);
     for (Eigen::Index p = 0; p < probes; ++p) {
       Quaternion<Decimal> sum;
-      for (Eigen::Index s = 0; s < m; ++s)
-        sum += Quaternion<Decimal>(Decimal(0), Decimal(pixels_(3 * p, s)),
-                                   Decimal(pixels_(3 * p + 1, s)), Decimal(pixels_(3 * p + 2, s))) *
-               shares.get(s, 0);
-      answer.background.insert(answer.background.end(), {sum.x, sum.y, sum.z});
+      Decimal absolute(0);
+      for (Eigen::Index s = 0; s < m; ++s) {
+        const auto term =
+            Quaternion<Decimal>(Decimal(0), Decimal(pixels_(3 * p, s)),
+                                Decimal(pixels_(3 * p + 1, s)), Decimal(pixels_(3 * p + 2, s))) *
+            shares.get(s, 0);
+        sum += term;
+        absolute += term.norm();
+      }
+      largest_sum = std::max(largest_sum, absolute);
+      for (const Decimal& part : {sum.x, sum.y, sum.z}) {
+        largest_part = std::max(largest_part, Decimal(abs(part)));
+        answer.background.push_back(part);
+      }
     }
   }
+  answer.cancellation = static_cast<double>(largest_sum / largest_part);
+  const auto phi = factor_.r * modes.combination;
+  Decimal squared_error(0), squared(0);
+  for (Eigen::Index t = 0; t < m; ++t) {
+    auto error = factor_.r.col(t);
+    for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p) {
+      auto mode = phi.col(p);
+      mode.scale_col(0, growth(modes, p, t) * modes.amplitudes.get(p, 0));
+      error -= mode;
+    }
+    squared_error += error.squared_norm();
+    squared += factor_.r.col(t).squared_norm();
+  }
+  if (squared > Decimal(0)) answer.fit = static_cast<double>(sqrt(squared_error / squared));
   return answer;
 }
 

@@ -19,6 +19,11 @@ struct Answer {
   int modes = 0;
   std::complex<Decimal> lambda;
   std::vector<Decimal> background;  // three parts a probed pixel and time
+  // The largest sum of the snapshots' shares, each in absolute value, over the largest |L|: what
+  // one rounding of the shares costs.
+  double cancellation = 1;
+  // (sum_t |x_t - L(t)|^2 / sum_t |x_t|^2)^(1/2)
+  double fit = 0;
 };
 
 // The same algorithm on the same window in `Decimal`. The Gram matrix is exact and 50 digits are
