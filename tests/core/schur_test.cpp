@@ -56,12 +56,12 @@ void expect_eigenvalues(const QuaternionMatrixd& a, const Values& expected, doub
 
 TEST(Schur, RandomMatricesOfEverySize) {
   std::mt19937 rng(41);
-  for (int m = 1; m <= 40; ++m) expect_schur(random_matrix(m, m, rng));
+  for (int m = 1; m <= 60; ++m) expect_schur(random_matrix(m, m, rng));
 }
 
 TEST(Schur, EigenvaluesAreThoseOfTheComplexAdjoint) {
   std::mt19937 rng(42);
-  for (int m : {1, 2, 3, 4, 5, 8, 13, 21, 34}) {
+  for (int m : {1, 2, 3, 4, 5, 8, 13, 21, 34, 47, 60}) {
     const auto a = random_matrix(m, m, rng);
     const auto form = expect_schur(a);
     const Eigen::ComplexEigenSolver<Eigen::MatrixXcd> reference(a.adjoint(), false);
