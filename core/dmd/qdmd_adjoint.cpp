@@ -1,10 +1,10 @@
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "core/dmd/qdmd.h"
+#include "core/quaternion/svd.h"
 
 namespace qdmd {
 namespace {
@@ -49,9 +49,8 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   const auto y = x.right_cols(m - 1);
 
   // Step 1, by the complex representation's SVD.
-  const Eigen::BDCSVD<Eigen::MatrixXcd> svd(x.left_cols(m - 1).adjoint(),
-                                            Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::VectorXd& doubled = svd.singularValues();
+  const auto svd = dense_svd(x.left_cols(m - 1).adjoint());
+  const Eigen::VectorXd& doubled = svd.values;
   const double tolerance = static_cast<double>(2 * std::max(x.rows(), m)) *
                            std::numeric_limits<double>::epsilon() * doubled(0);
   Index rank = 0;
@@ -62,8 +61,8 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   Eigen::VectorXd sigma(rank);
   for (Index k = 0; k < rank; ++k) sigma(k) = doubled(2 * k);
   result.summary.condition = sigma(0) / sigma(rank - 1);
-  const auto u = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.matrixU(), rank));
-  const auto v = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.matrixV(), rank));
+  const auto u = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.u, rank));
+  const auto v = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.v, rank));
   const auto v_over_s = v.scale_cols(sigma.cwiseInverse());
 
   // Steps 2 and 3.

@@ -40,12 +40,6 @@ struct Projection {
   QuaternionMatrix<Real> coefficients, q_tilde;
 };
 
-// What an eigenpair's residual may be for it to count as found.
-template <typename Real>
-Real residual_limit(Eigen::Index size) {
-  return Real(50 * static_cast<double>(size)) * std::numeric_limits<Real>::epsilon();
-}
-
 // The paper's amplitude of one mode without the others: b = (y w)^-1 y a for the left eigenvector y
 // (a row) and the right one w in coordinates in which a = argmin |Y C a - x_1|. Empty where y and w
 // are orthogonal to working accuracy, as those of a defective eigenvalue are.
@@ -54,7 +48,9 @@ std::optional<Quaternion<Real>> amplitude_from_left_vector(const QuaternionMatri
                                                            const QuaternionMatrix<Real>& w,
                                                            const QuaternionMatrix<Real>& a) {
   const Quaternion<Real> share = (y * w).get(0, 0);
-  if (!(share.norm() > residual_limit<Real>(w.rows()) * y.norm() * w.norm())) return std::nullopt;
+  const Real limit =
+      Real(50 * static_cast<double>(w.rows())) * std::numeric_limits<Real>::epsilon();
+  if (!(share.norm() > limit * y.norm() * w.norm())) return std::nullopt;
   return share.inverse() * (y * a).get(0, 0);
 }
 
@@ -71,11 +67,6 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
   const auto pair = pencil.nearest();
   if (!pair) return std::nullopt;
   const auto v = to_matrix(pair->vector);
-  auto expected = b * v;
-  expected.scale_col(0, Quaternion<Real>(pair->value));
-  const Real residual =
-      (h * v - expected).norm() / (h.norm() + Quaternion<Real>(pair->value).norm() * b.norm());
-  if (!(residual <= residual_limit<Real>(h.rows()))) return std::nullopt;
   QuaternionModes<Real> result(factor.r.cols(), 1);
   result.eigenvalues(0) = pair->value;
   set_combination(&result, 0, coefficients ? *coefficients * v : v);
@@ -89,7 +80,7 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
   } else {
     fit_to_window(&result, factor.r * result.combination, factor.r);
   }
-  describe_nearest(&result, residual);
+  describe_nearest(&result, pair->residual);
   return result;
 }
 

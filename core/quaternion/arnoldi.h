@@ -7,13 +7,6 @@
 
 namespace qdmd {
 
-// An approximate eigenpair A v = v value. `value` is standard (imaginary part >= 0), |v| = 1.
-template <typename Real>
-struct RitzPair {
-  std::complex<Real> value;
-  std::vector<Quaternion<Real>> vector;
-};
-
 // A Krylov space of growing dimension, A K = K H + remainder, with its Ritz values.
 // `Operator` maps a column of `size` quaternions to another and is linear from the right.
 template <typename Real, typename Operator>

@@ -8,6 +8,14 @@
 
 namespace qdmd {
 
+// H v = B v lambda, lambda standard (imaginary part >= 0), |v| = 1.
+template <typename Real>
+struct PencilEigenpair {
+  std::complex<Real> value;
+  std::vector<Quaternion<Real>> vector;
+  Real residual;  // |H v - B v lambda| / (|H| + |lambda| |B|), at most 50 size epsilon
+};
+
 // H v = B v lambda with H upper Hessenberg, B upper triangular with a non-zero diagonal, both
 // size x size. Shift and invert at the real shift 1: the operator (H - B)^-1 B has the eigenvalues
 // 1 / (lambda - 1), so that Arnoldi's method (inverse iteration that remembers its steps) finds
@@ -18,7 +26,7 @@ class Pencil {
   using Column = std::vector<Quaternion<Real>>;
 
   Pencil(const QuaternionMatrix<Real>& h, const QuaternionMatrix<Real>& b)
-      : b_(b), shifted_(h - b), size_(h.rows()) {
+      : h_(h), b_(b), shifted_(h - b), size_(h.rows()) {
     const Real scale = h.norm() + b.norm();
     shifted_.raise_pivots(
         std::max(std::numeric_limits<Real>::epsilon() * scale, std::numeric_limits<Real>::min()));
@@ -26,7 +34,7 @@ class Pencil {
 
   // The eigenpair with the smallest |ln lambda|, |v| = 1. Empty where the nearest eigenvalues are
   // so crowded (or so defective) that kMaxSteps steps cannot tell them apart: take the Schur form.
-  std::optional<RitzPair<Real>> nearest() const {
+  std::optional<PencilEigenpair<Real>> nearest() const {
     using std::abs, std::log;
     Arnoldi<Real, Forward> space(Forward{this}, size_);
     while (!space.complete() && space.dimension() < kMaxSteps) {
@@ -103,7 +111,7 @@ class Pencil {
   }
 
   // One more step of inverse iteration, and its Rayleigh quotient.
-  std::optional<RitzPair<Real>> polished(Column v) const {
+  std::optional<PencilEigenpair<Real>> polished(Column v) const {
     using Space = Arnoldi<Real, Forward>;
     Quaternion<Real> mu;
     for (int pass = 0; pass < 2; ++pass) {
@@ -120,10 +128,33 @@ class Pencil {
     const Quaternion<Real> lambda = Quaternion<Real>(Real(1)) + mu.inverse();
     const Quaternion<Real> turn = standardizing_rotation(lambda);
     for (auto& q : v) q = q * turn;
-    return RitzPair<Real>{standard(lambda), std::move(v)};
+    PencilEigenpair<Real> pair{standard(lambda), std::move(v), Real(0)};
+    pair.residual = residual(pair);
+    // A step's rounding is small next to the operator, which is 1 / epsilon in size where 1 itself
+    // is a defective eigenvalue: only this tells whether the pair is one.
+    const Real limit = Real(50 * static_cast<double>(size_)) * std::numeric_limits<Real>::epsilon();
+    if (!(pair.residual <= limit)) return std::nullopt;
+    return pair;
   }
 
-  ScalarGrid<Real> b_;
+  Real residual(const PencilEigenpair<Real>& pair) const {
+    using std::sqrt;
+    const Quaternion<Real> lambda(pair.value);
+    const Column bv = multiply_upper(b_, pair.vector);
+    Real error(0), h_squared(0), b_squared(0);
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      Quaternion<Real> sum = -(bv[static_cast<size_t>(i)] * lambda);
+      for (Eigen::Index k = std::max<Eigen::Index>(i - 1, 0); k < size_; ++k) {
+        sum += h_(i, k) * pair.vector[static_cast<size_t>(k)];
+        h_squared += h_(i, k).squared_norm();
+        b_squared += b_(i, k).squared_norm();
+      }
+      error += sum.squared_norm();
+    }
+    return sqrt(error) / (sqrt(h_squared) + lambda.norm() * sqrt(b_squared));
+  }
+
+  ScalarGrid<Real> h_, b_;
   HessenbergQr<Real> shifted_;
   Eigen::Index size_;
 };

@@ -7,6 +7,34 @@
 
 namespace qdmd {
 
+// Thin singular value decomposition of a real or complex matrix.
+template <typename Matrix>
+struct DenseSvd {
+  Eigen::Matrix<typename Matrix::RealScalar, Eigen::Dynamic, 1> values;
+  Matrix u, v;
+};
+
+// Eigen's divide and conquer, checked: in Eigen 3.4 it is wrong by up to a million epsilon in a few
+// percent of the matrices that have clusters of singular values. Jacobi's method serves these.
+template <typename Matrix>
+DenseSvd<Matrix> dense_svd(const Matrix& m) {
+  using Real = typename Matrix::RealScalar;
+  constexpr unsigned kThin = Eigen::ComputeThinU | Eigen::ComputeThinV;
+  const auto as_result = [](const auto& svd) {
+    return DenseSvd<Matrix>{svd.singularValues(), svd.matrixU(), svd.matrixV()};
+  };
+  DenseSvd<Matrix> result = as_result(Eigen::BDCSVD<Matrix>(m, kThin));
+  const Real tolerance =
+      Real(100 * static_cast<double>(m.cols())) * std::numeric_limits<Real>::epsilon();
+  const auto orthonormal = [&](const Matrix& q) {
+    return (q.adjoint() * q - Matrix::Identity(q.cols(), q.cols())).norm() <= tolerance;
+  };
+  const Matrix us = result.u * result.values.template cast<typename Matrix::Scalar>().asDiagonal();
+  const bool good = (us * result.v.adjoint() - m).norm() <= tolerance * m.norm() &&
+                    orthonormal(result.u) && orthonormal(result.v);
+  return good ? result : as_result(Eigen::JacobiSVD<Matrix>(m, kThin));
+}
+
 // M = U diag(values) V^H: u is rows x k, v is cols x k, both with orthonormal columns,
 // k = min(rows, cols), values in decreasing order.
 template <typename Real>
@@ -66,12 +94,12 @@ Svd<Real> svd(QuaternionMatrix<Real> m) {
   for (size_t k = right.size(); k-- > 0;)
     apply_left(right[k], v, static_cast<Index>(k) + 1, 0, cols);
 
-  const Eigen::BDCSVD<RealMatrix> real(bidiagonal, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const auto real = dense_svd(bidiagonal);
   using std::ldexp;
-  result.values = real.singularValues().unaryExpr(
-      [exponent](const Real& value) { return Real(ldexp(value, exponent)); });
-  const auto turn_u = real.matrixU().template cast<Complex>().eval();
-  const auto turn_v = real.matrixV().template cast<Complex>().eval();
+  result.values =
+      real.values.unaryExpr([exponent](const Real& value) { return Real(ldexp(value, exponent)); });
+  const auto turn_u = real.u.template cast<Complex>().eval();
+  const auto turn_v = real.v.template cast<Complex>().eval();
   result.u = {u.a * turn_u, u.b * turn_u};
   result.v = {v.a * turn_v, v.b * turn_v};
   return result;

@@ -208,8 +208,7 @@ TEST(Solvers, BlackFirstFrameLeavesTheBackground) {
 
 // ---- Fades: eigenvalues that are defective ----
 
-// Disabled: Pencil::nearest() takes a wrong eigenpair next to a Jordan block at one.
-TEST(Solvers, DISABLED_PolynomialFadesHaveSmallResiduals) {
+TEST(Solvers, PolynomialFadesHaveSmallResiduals) {
   // A + t B + t^2 C, exact in 8 bits: a Jordan block at one as large as the rank.
   for (int degree : {1, 2, 3})
     for (size_t count : {6u, 8u, 10u}) {

@@ -196,7 +196,7 @@ std::vector<HardCase> make_cases() {
   add("m = 2", "the decomposition is one quaternion", [] { return noisy(43, 2); });
   add("m = 1", "no pair of frames", [] { return noisy(44, 1); });
   add("n < m", "5 pixels, 11 frames", [] { return noisy(45, 11, 20, 5); });
-  add("1024 frames", "a long window of 12 pixels", [] { return noisy(46, 1024, 8, 12); });
+  add("1024 frames", "a long window of 6 pixels", [] { return noisy(46, 1024, 8, 6); });
   return all;
 }
 

@@ -79,6 +79,9 @@ TEST_P(HardCases, NothingIsNaN) {
             if (hard_case().large && (solver == Solver::adjoint || solver == Solver::qr)) continue;
             // The channels look at no solver.
             if (method == Method::dmd && solver != Solver::gram) continue;
+            // Seconds for each channel's dense eigenproblems.
+            if (method == Method::dmd && window.size() > 100 && (rank > 0 || threshold > 0))
+              continue;
             SCOPED_TRACE(std::string(name(solver)) + ", rank " + std::to_string(rank) +
                          ", threshold " + std::to_string(threshold));
             DmdOptions options;
