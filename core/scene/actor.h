@@ -1,0 +1,68 @@
+// Who moves through a scene, and where everybody is at a time.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/scene/random.h"
+#include "core/scene/sprite.h"
+
+namespace qdmd::scene {
+
+// A sprite in the frame; (x, y) is its top left corner in the frame's coordinates.
+struct Placement {
+  const Sprite* sprite = nullptr;
+  int x = 0, y = 0;
+  // The truth has it in the background: it has not moved yet.
+  bool part_of_background = false;
+
+  int feet() const { return y + sprite->height(); }
+  // Around the opaque pixels.
+  Box box() const {
+    const Box& extent = sprite->extent;
+    return {x + extent.x, y + extent.y, extent.width, extent.height};
+  }
+};
+
+// Places follow from the time alone, so that every frame can be asked for first.
+class Actor {
+ public:
+  virtual ~Actor() = default;
+  // Appends what is there at `time` (seconds, >= 0), perhaps outside of the frame.
+  virtual void place(double time, std::vector<Placement>* placements) const = 0;
+};
+
+// What clothes a figure that moves in `region` (of the frame) wears.
+using Dress = std::function<Sprite(const Sprite&, const Box& region)>;
+
+// One person in some phases of the step, in both directions.
+class Person {
+ public:
+  Person(int height, Stream& stream, const Dress& dress, const Box& region);
+
+  int width() const { return forward_.front().width(); }
+  int height() const { return forward_.front().height(); }
+  // `walked` is the way in pixels since some start; its sign is the direction looked in.
+  const Sprite& at(double walked, bool forward) const;
+
+ private:
+  std::vector<Sprite> forward_, backward_;
+};
+
+// The mover of the default scene: persons cross the frame, one after the other, in turn from the
+// left and from the right. Crossing takes kCrossing seconds, and `pause` more in the middle.
+class Crossing : public Actor {
+ public:
+  static constexpr double kCrossing = 5;
+
+  Crossing(int width, int height, double pause, const StreamSource& streams, const Dress& dress);
+  void place(double time, std::vector<Placement>* placements) const override;
+
+ private:
+  int width_, height_;
+  double pause_;
+  StreamSource streams_;
+  std::vector<Person> people_;
+};
+
+}  // namespace qdmd::scene

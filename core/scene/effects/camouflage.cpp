@@ -1,0 +1,39 @@
+#include "core/scene/effects/infos.h"
+
+namespace qdmd::scene {
+namespace {
+
+// Of the figures' own texture; the rest is plain cloth.
+constexpr double kTexture = 0.1;
+
+class Camouflage : public Effect {
+ public:
+  Camouflage(Values values, const StreamSource&) : contrast_(values[0]) {}
+
+  void plan(Plan& plan) override {
+    plan.dress = [backdrop = plan.backdrop, contrast = contrast_](const Sprite& sprite,
+                                                                  const Box& region) {
+      const int margin = backdrop->margin();
+      auto mean =
+          backdrop->mean({region.x + margin, region.y + margin, region.width, region.height});
+      for (auto& level : mean) level += contrast;
+      return repainted(sprite, mean, kTexture);
+    };
+  }
+
+ private:
+  double contrast_;
+};
+
+constexpr Parameter kParameters[] = {
+    {"contrast", "levels", 10, 0, 100, "how much lighter than that colour they are on average"},
+};
+
+}  // namespace
+
+const EffectInfo kCamouflage = {
+    "camouflage", "objects wear the mean colour of the background on their way",
+    kPlan,        0,
+    kParameters,  make_effect<Camouflage>};
+
+}  // namespace qdmd::scene

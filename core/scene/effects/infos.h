@@ -1,0 +1,18 @@
+// The descriptions of the effects; each is defined in the one file that simulates it.
+#pragma once
+
+#include "core/scene/effect.h"
+
+namespace qdmd::scene {
+
+extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kClutter,
+    kBootstrap, kLeaves, kWater, kFlicker, kShadow, kMotionBlur, kRain, kSnow, kDefocus, kJitter,
+    kFade, kLightSwitch, kNight, kBands, kExposure, kNoise, kCompression;
+
+// For EffectInfo::make.
+template <typename Class>
+std::unique_ptr<Effect> make_effect(Values values, const StreamSource& streams) {
+  return std::make_unique<Class>(values, streams);
+}
+
+}  // namespace qdmd::scene

@@ -1,0 +1,98 @@
+#include "core/scene/paint.h"
+
+#include <cmath>
+#include <cstring>
+
+#include "core/scene/scene.h"
+
+namespace qdmd::scene {
+namespace {
+
+template <int kSamples, unsigned kRound>
+void crop_raster(const Raster<kSamples>& canvas, double left, double top, Raster<kSamples>* frame) {
+  // In 1/256 pixel: the four weights are integers that add up to 65536.
+  const auto x = static_cast<int>(std::lround(left * 256));
+  const auto y = static_cast<int>(std::lround(top * 256));
+  const int x0 = std::clamp(x >> 8, 0, canvas.width - frame->width);
+  const int y0 = std::clamp(y >> 8, 0, canvas.height - frame->height);
+  const auto right_share = static_cast<unsigned>(x & 255),
+             lower_share = static_cast<unsigned>(y & 255);
+  const int x1 = std::min(x0 + 1, canvas.width - frame->width);
+  const int y1 = std::min(y0 + 1, canvas.height - frame->height);
+  const unsigned w00 = (256 - right_share) * (256 - lower_share);
+  const unsigned w01 = right_share * (256 - lower_share);
+  const unsigned w10 = (256 - right_share) * lower_share, w11 = right_share * lower_share;
+  const size_t bytes = frame->row_bytes();
+  for (int row = 0; row < frame->height; ++row) {
+    const uint8_t *a = canvas.at(x0, y0 + row), *b = canvas.at(x1, y0 + row);
+    const uint8_t *c = canvas.at(x0, y1 + row), *d = canvas.at(x1, y1 + row);
+    uint8_t* out = frame->row(row);
+    if (right_share == 0 && lower_share == 0) {
+      std::memcpy(out, a, bytes);
+      continue;
+    }
+    for (size_t i = 0; i < bytes; ++i)
+      out[i] =
+          static_cast<uint8_t>((w00 * a[i] + w01 * b[i] + w10 * c[i] + w11 * d[i] + kRound) >> 16);
+  }
+}
+
+using Curve = std::array<uint8_t, 256>;
+
+Curve curve(double gain) {
+  Curve levels;
+  for (size_t i = 0; i < levels.size(); ++i) levels[i] = to_level(static_cast<double>(i) * gain);
+  return levels;
+}
+
+}  // namespace
+
+void paint_sprite(const Sprite& sprite, int x, int y, Picture* canvas) {
+  visit_runs(sprite, x, y, canvas->width, canvas->height,
+             [&](int row, int left, int length, const Sprite::Run& run, int skipped) {
+               std::memcpy(canvas->at(left, row), sprite.picture.at(run.x + skipped, run.y),
+                           static_cast<size_t>(length) * Picture::kSamplesPerPixel);
+             });
+}
+
+void paint_coverage(const Sprite& sprite, int x, int y, Plane* canvas) {
+  visit_runs(sprite, x, y, canvas->width, canvas->height,
+             [&](int row, int left, int length, const Sprite::Run&, int) {
+               std::memset(canvas->at(left, row), 255, static_cast<size_t>(length));
+             });
+}
+
+void crop(const Picture& canvas, double left, double top, Picture* frame) {
+  crop_raster<3, 32768>(canvas, left, top, frame);
+}
+
+void crop(const Plane& canvas, double left, double top, Plane* frame) {
+  crop_raster<1, 65535>(canvas, left, top, frame);
+}
+
+void apply(const Light& light, Picture* picture) {
+  std::array<Curve, 3> curves;
+  const auto set_curves = [&](double factor) {
+    for (size_t c = 0; c < 3; ++c)
+      curves[c] = c > 0 && light.gain[c] == light.gain[c - 1] ? curves[c - 1]
+                                                              : curve(light.gain[c] * factor);
+  };
+  set_curves(1);
+  for (int y = 0; y < picture->height; ++y) {
+    if (!light.rows.empty()) set_curves(light.rows[static_cast<size_t>(y)]);
+    uint8_t* row = picture->row(y);
+    for (int x = 0; x < picture->width; ++x, row += 3)
+      for (size_t c = 0; c < 3; ++c) row[c] = curves[c][row[c]];
+  }
+}
+
+void to_labels(const Plane& shadow, Plane* coverage) {
+  uint8_t* label = coverage->samples.data();
+  const uint8_t* dark = shadow.samples.empty() ? nullptr : shadow.samples.data();
+  for (size_t i = 0; i < coverage->samples.size(); ++i) {
+    const uint8_t beneath = dark && dark[i] ? kShadowLabel : kBackgroundLabel;
+    label[i] = label[i] >= 128 ? kObjectLabel : label[i] > 0 ? kPartLabel : beneath;
+  }
+}
+
+}  // namespace qdmd::scene

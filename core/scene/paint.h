@@ -1,0 +1,38 @@
+// Pixel work that every scene needs: sprites onto pictures, cropping, light.
+#pragma once
+
+#include "core/scene/actor.h"
+#include "core/scene/effect.h"
+#include "core/scene/raster.h"
+
+namespace qdmd::scene {
+
+// Calls `visit(y, x, length, run, skipped)` for the visible part of each run of the sprite at
+// (x, y) of a canvas; `skipped` pixels of the run lie to the left of it.
+template <typename Visit>
+void visit_runs(const Sprite& sprite, int x, int y, int width, int height, Visit visit) {
+  for (const Sprite::Run& run : sprite.runs) {
+    const int row = y + run.y;
+    if (row < 0 || row >= height) continue;
+    const int left = std::max(x + run.x, 0), right = std::min(x + run.x + run.length, width);
+    if (left < right) visit(row, left, right - left, run, left - (x + run.x));
+  }
+}
+
+// (x, y) in the canvas's coordinates.
+void paint_sprite(const Sprite& sprite, int x, int y, Picture* canvas);
+void paint_coverage(const Sprite& sprite, int x, int y, Plane* canvas);
+
+// The frame out of a canvas, looked at beside its place by a fraction of pixels: bilinear between
+// the four neighbours. (left, top) of the canvas is the frame's first pixel at shift 0; shifts stay
+// inside the canvas.
+void crop(const Picture& canvas, double left, double top, Picture* frame);
+// The same, rounded up, so that a pixel that an object touches at all is not 0.
+void crop(const Plane& canvas, double left, double top, Plane* frame);
+
+void apply(const Light& light, Picture* picture);
+
+// kBackgroundLabel, kShadowLabel, kPartLabel or kObjectLabel in place of the coverage.
+void to_labels(const Plane& shadow, Plane* coverage);
+
+}  // namespace qdmd::scene

@@ -1,0 +1,198 @@
+#include "core/scene/scene.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "core/scene/paint.h"
+
+namespace qdmd::scene {
+namespace {
+
+void check(const SceneOptions& options) {
+  const int longest = SceneOptions::kMaxSide;
+  if (options.width < 1 || options.height < 1 || options.width > longest ||
+      options.height > longest)
+    throw std::invalid_argument("A scene has sides of 1 to " + std::to_string(longest) +
+                                " pixels: change width and height.");
+  if (!(options.frames_per_second > 0) || !std::isfinite(options.frames_per_second))
+    throw std::invalid_argument("A scene needs a frame rate above 0: change frames_per_second.");
+}
+
+}  // namespace
+
+Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
+    : options_(options) {
+  check(options);
+  const auto streams = [&](std::string_view name) {
+    return StreamSource(options.seed, name, options.draw_log);
+  };
+  int margin = 0;
+  for (const NamedEffect& effect : named) {
+    effects_.push_back(effect.info->make(effect.values, streams(effect.info->name)));
+    margin += effects_.back()->margin();
+  }
+  backdrop_ =
+      std::make_unique<Backdrop>(options.width, options.height, margin, streams("backdrop"));
+
+  plan_.width = options.width;
+  plan_.height = options.height;
+  plan_.interval = 1 / options.frames_per_second;
+  plan_.backdrop = backdrop_.get();
+  plan_.metered = [this](double time) { return metered(time); };
+  for (size_t i = 0; i < named.size(); ++i) {
+    Effect* effect = effects_[i].get();
+    const unsigned stages = named[i].info->stages;
+    if (stages & kPlan) effect->plan(plan_);
+    if (stages & kWorld) stages_.world.push_back(effect);
+    if (stages & kGround) stages_.ground.push_back(effect);
+    if (stages & kExpose) stages_.expose.push_back(effect);
+    if (stages & kAir) stages_.air.push_back(effect);
+    if (stages & kLens) stages_.lens.push_back(effect);
+    if (stages & kLight) stages_.light.push_back(effect);
+    if (stages & kMeter) stages_.meter.push_back(effect);
+    if (stages & kSensor) stages_.sensor.push_back(effect);
+  }
+  plan_.actors.push_back(std::make_unique<Crossing>(options.width, options.height, plan_.pause,
+                                                    streams("mover"), plan_.dress));
+
+  state_.width = options.width;
+  state_.height = options.height;
+  state_.margin = margin;
+  state_.interval = plan_.interval;
+  state_.world = backdrop_->picture();
+  if (!stages_.meter.empty()) backdrop_mean_ = backdrop_->mean({});
+}
+
+Scene::~Scene() = default;
+
+// The light that falls on the street and on whoever is in view.
+double Scene::metered(double time) {
+  Light light;
+  for (const Effect* effect : stages_.light) effect->light(time, &light);
+  std::array<double, 3> mean = backdrop_mean_;
+  metered_placements_.clear();
+  for (const auto& actor : plan_.actors) actor->place(time, &metered_placements_);
+  const Box frame{0, 0, options_.width, options_.height};
+  for (const Placement& placement : metered_placements_) {
+    const Box seen = intersection(placement.box(), frame), whole = placement.box();
+    if (seen.empty()) continue;
+    const double visible = static_cast<double>(seen.width) * seen.height / whole.width /
+                           whole.height * placement.sprite->area;
+    const double share = std::min(1.0, visible / frame.width / frame.height);
+    for (size_t c = 0; c < 3; ++c)
+      mean[c] += share * (placement.sprite->mean[c] - backdrop_mean_[c]);
+  }
+  double level = 0;
+  for (size_t c = 0; c < 3; ++c) level += light.gain[c] * mean[c] / 3;
+  return level;
+}
+
+// Whoever is there, the farthest first.
+void Scene::place(double time) {
+  placements_.clear();
+  for (const auto& actor : plan_.actors) actor->place(time, &placements_);
+  for (size_t i = 1; i < placements_.size(); ++i)
+    for (size_t k = i; k > 0 && placements_[k].feet() < placements_[k - 1].feet(); --k)
+      std::swap(placements_[k], placements_[k - 1]);
+}
+
+void Scene::paint_world() {
+  const bool any_part = std::any_of(placements_.begin(), placements_.end(),
+                                    [](const Placement& p) { return p.part_of_background; });
+  const bool moves = any_part || !stages_.world.empty();
+  // A world that stands still was painted when the scene was made.
+  if (moves || world_moves_) state_.world = backdrop_->picture();
+  world_moves_ = moves;
+  if (!moves) return;
+  for (Effect* effect : stages_.world) effect->world(state_);
+  for (const Placement& placement : placements_)
+    if (placement.part_of_background)
+      paint_sprite(*placement.sprite, placement.x + state_.margin, placement.y + state_.margin,
+                   &state_.world);
+}
+
+void Scene::paint_objects(double time) {
+  place(time);
+  const bool labels = state_.wants(kLabels), frame = state_.wants(kFrame);
+  if (frame) state_.picture = state_.world;
+  if (labels) {
+    state_.coverage.resize(state_.world.width, state_.world.height);
+    state_.coverage.fill(0);
+  }
+  for (Effect* effect : stages_.ground) effect->ground(state_, placements_);
+  for (const Placement& placement : placements_) {
+    if (placement.part_of_background) continue;
+    const int x = placement.x + state_.margin, y = placement.y + state_.margin;
+    if (frame) paint_sprite(*placement.sprite, x, y, &state_.picture);
+    if (labels) paint_coverage(*placement.sprite, x, y, &state_.coverage);
+  }
+}
+
+void Scene::find_boxes() {
+  boxes_.clear();
+  for (const Placement& placement : placements_) {
+    if (placement.part_of_background) continue;
+    const Box whole = placement.box();
+    const int left = static_cast<int>(std::floor(whole.x - state_.shift_x));
+    const int top = static_cast<int>(std::floor(whole.y - state_.shift_y));
+    const int right = static_cast<int>(std::ceil(whole.right() - state_.shift_x));
+    const int bottom = static_cast<int>(std::ceil(whole.bottom() - state_.shift_y));
+    const Box seen =
+        intersection({left, top, right - left, bottom - top}, {0, 0, state_.width, state_.height});
+    if (!seen.empty()) boxes_.push_back(seen);
+  }
+}
+
+void Scene::crop_to_frame() {
+  const double left = state_.margin + state_.shift_x, top = state_.margin + state_.shift_y;
+  const auto cut = [&](auto* canvas, auto* frame) {
+    frame->resize(state_.width, state_.height);
+    crop(*canvas, left, top, frame);
+    std::swap(*canvas, *frame);
+  };
+  if (state_.wants(kFrame)) cut(&state_.picture, &cropped_);
+  if (state_.wants(kTruth)) cut(&state_.truth, &cropped_);
+  if (state_.wants(kLabels)) {
+    cut(&state_.coverage, &cropped_plane_);
+    if (!state_.shadow.samples.empty()) cut(&state_.shadow, &cropped_plane_);
+  }
+}
+
+void Scene::render(int64_t index, unsigned wanted) {
+  state_.index = index;
+  state_.wanted = wanted;
+  state_.time = static_cast<double>(index) * (plan_.pace > 0 ? plan_.pace : plan_.interval);
+  state_.shift_x = state_.shift_y = 0;
+
+  place(state_.time);
+  paint_world();
+  if (state_.wants(kFrame) || state_.wants(kLabels)) {
+    if (stages_.expose.empty()) paint_objects(state_.time);
+    for (Effect* effect : stages_.expose)
+      effect->expose(state_, [this](double time) { paint_objects(time); });
+  }
+  if (state_.wants(kTruth)) state_.truth = state_.world;
+  if (state_.wants(kFrame))
+    for (Effect* effect : stages_.air) effect->air(state_);
+
+  for (Effect* effect : stages_.lens) effect->lens(state_);
+  if (state_.margin > 0) crop_to_frame();
+
+  state_.light.gain = {1, 1, 1};
+  for (const Effect* effect : stages_.light) effect->light(state_.time, &state_.light);
+  for (const Effect* effect : stages_.meter) effect->meter(state_.time, &state_.light);
+  if (!stages_.light.empty() || !stages_.meter.empty()) {
+    if (state_.wants(kFrame)) apply(state_.light, &state_.picture);
+    if (state_.wants(kTruth)) apply(state_.light, &state_.truth);
+  }
+
+  if (state_.wants(kFrame))
+    for (Effect* effect : stages_.sensor) effect->sensor(state_);
+  if (state_.wants(kLabels)) to_labels(state_.shadow, &state_.coverage);
+  if (state_.wants(kBoxes)) {
+    place(state_.time);
+    find_boxes();
+  }
+}
+
+}  // namespace qdmd::scene

@@ -1,0 +1,85 @@
+// A scene: frames of a street with known background, mask, boxes and light.
+#pragma once
+
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/description.h"
+
+namespace qdmd::scene {
+
+struct SceneOptions {
+  int width = 320, height = 240;  // pixels, 1 .. kMaxSide
+  double frames_per_second = 25;  // above 0
+  uint64_t seed = 0;
+  std::vector<DrawRecord>* draw_log = nullptr;  // if not null, gets what each stream drew
+
+  static constexpr int kMaxSide = 16384;
+};
+
+// Labels of the mask, those of CDnet.
+inline constexpr uint8_t kBackgroundLabel = 0;
+inline constexpr uint8_t kShadowLabel = 50;
+inline constexpr uint8_t kPartLabel = 170;  // an object covers less than half of the pixel
+inline constexpr uint8_t kObjectLabel = 255;
+
+// Frame k follows from the options, the effects and k alone, whichever frames came before. Where
+// the label is kBackgroundLabel and no effect of the stages air and sensor is named, frame and true
+// background are equal to the bit. Effects that are not named have no part in it: no memory, no
+// random number, no code in the loop over frames.
+class Scene {
+ public:
+  // Throws std::invalid_argument, with a sentence that says what is allowed, for options out of
+  // range and for effects that this build or these options cannot serve.
+  Scene(const SceneOptions& options, const std::vector<NamedEffect>& effects);
+  Scene(const SceneOptions& options, std::string_view text) : Scene(options, parse_scene(text)) {}
+  ~Scene();
+
+  int width() const { return state_.width; }
+  int height() const { return state_.height; }
+  // Frames of the scene; 0: endless.
+  int64_t length() const { return plan_.length; }
+
+  // Makes what `wanted` (of Wanted) names of frame `index` >= 0. Valid until the next call.
+  void render(int64_t index, unsigned wanted);
+
+  const Picture& frame() const { return state_.picture; }
+  // The background as the camera would see it without objects, before weather, noise and codec.
+  const Picture& background() const { return state_.truth; }
+  // width x height labels.
+  const Plane& labels() const { return state_.coverage; }
+  // Of every object of which some pixel may be in the frame.
+  const std::vector<Box>& boxes() const { return boxes_; }
+  const Light& light() const { return state_.light; }
+  // Pixels by which the camera looks to the right and down of its place.
+  double shift_x() const { return state_.shift_x; }
+  double shift_y() const { return state_.shift_y; }
+
+ private:
+  struct Stages {
+    std::vector<Effect*> world, ground, expose, air, lens, light, meter, sensor;
+  };
+
+  double metered(double time);
+  void place(double time);
+  void paint_world();
+  void paint_objects(double time);
+  void crop_to_frame();
+  void find_boxes();
+
+  SceneOptions options_;
+  std::vector<std::unique_ptr<Effect>> effects_;
+  std::unique_ptr<Backdrop> backdrop_;
+  Plan plan_;
+  Stages stages_;
+  bool world_moves_ = false;
+  FrameState state_;
+  std::vector<Placement> placements_, metered_placements_;
+  Picture cropped_;
+  Plane cropped_plane_;
+  std::vector<Box> boxes_;
+  std::array<double, 3> backdrop_mean_{};
+};
+
+}  // namespace qdmd::scene
