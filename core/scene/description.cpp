@@ -70,8 +70,12 @@ std::string list_of_parameters(const EffectInfo& info) {
   return text.str();
 }
 
-[[noreturn]] void refuse(const std::string& what, const std::string& allowed) {
-  throw std::invalid_argument(what + " " + allowed);
+// The parts of what is wrong, joined; the last one says what is allowed.
+template <typename... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  std::ostringstream text;
+  (text << ... << parts);
+  throw std::invalid_argument(text.str());
 }
 
 void set_value(const EffectInfo& info, std::string_view name, std::string_view text,
@@ -79,14 +83,13 @@ void set_value(const EffectInfo& info, std::string_view name, std::string_view t
   const auto parameter = std::find_if(info.parameters.begin(), info.parameters.end(),
                                       [&](const Parameter& p) { return name == p.name; });
   if (parameter == info.parameters.end())
-    refuse("The effect " + std::string(info.name) + " has no parameter " + std::string(name) + ".",
-           list_of_parameters(info));
+    refuse("The effect ", info.name, " has no parameter \"", name,
+           "\": ", list_of_parameters(info));
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
       value < parameter->minimum || value > parameter->maximum)
-    refuse("\"" + std::string(text) + "\" is no value for " + info.name + "'s " + parameter->name +
-               ".",
+    refuse("\"", text, "\" is no value for ", info.name, "'s ", parameter->name, ": ",
            list_of_parameters(info));
   (*values)[static_cast<size_t>(parameter - info.parameters.begin())] = value;
 }
@@ -99,8 +102,7 @@ NamedEffect parse_effect(const EffectInfo& info, std::string_view item) {
     const auto equals = parts[i].find('=');
     if (equals == std::string_view::npos) {
       if (i == 0) continue;
-      refuse("\"" + std::string(parts[i]) + "\" in " + info.name + " has no value.",
-             list_of_parameters(info));
+      refuse("\"", parts[i], "\" in ", info.name, " has no value: ", list_of_parameters(info));
     }
     const std::string_view name = i == 0 ? std::string_view(info.parameters.front().name)
                                          : trimmed(parts[i].substr(0, equals));
@@ -136,7 +138,7 @@ std::vector<NamedEffect> parse_scene(std::string_view text) {
     const auto info = std::find_if(effects().begin(), effects().end(),
                                    [&](const EffectInfo* e) { return name == e->name; });
     if (info == effects().end())
-      refuse("There is no preset or effect \"" + std::string(name) + "\".", list_of_names());
+      refuse("There is no preset or effect \"", name, "\". ", list_of_names());
     put(parse_effect(**info, item));
   }
   const auto rank = [](const NamedEffect& effect) {
