@@ -30,7 +30,7 @@ using Ref = std::unique_ptr<T, Unref>;
 struct Options {
   int frames = 0;  // 0: all
   int window_size = 100;
-  bool test_source = false;
+  std::string scene;  // of qdmdscenesrc, in place of a video
   std::string output_dir = ".";
   std::string video;
 };
@@ -43,15 +43,14 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it"
 
 bool parse(int argc, char** argv, Options* options) {
   gint frames = 0, window_size = options->window_size;
-  gboolean test_source = FALSE;
-  gchar* output_dir = nullptr;
+  gchar *output_dir = nullptr, *scene = nullptr;
   gchar** rest = nullptr;
   const GOptionEntry entries[] = {
       {"frames", 'n', 0, G_OPTION_ARG_INT, &frames, "Stop after N frames (0: all)", "N"},
       {"window-size", 'w', 0, G_OPTION_ARG_INT, &window_size, "Frames decomposed together", "M"},
       {"output-dir", 'o', 0, G_OPTION_ARG_FILENAME, &output_dir, "Where the results go", "DIR"},
-      {"test-source", 't', 0, G_OPTION_ARG_NONE, &test_source, "A moving ball in place of a video",
-       nullptr},
+      {"scene", 's', 0, G_OPTION_ARG_STRING, &scene, "A simulated scene in place of a video",
+       "PRESET or EFFECTS"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &rest, nullptr, "VIDEO"},
       {}};
   GOptionContext* context = g_option_context_new("- separate a video and show the result");
@@ -66,11 +65,11 @@ bool parse(int argc, char** argv, Options* options) {
   }
   options->frames = frames;
   options->window_size = window_size;
-  options->test_source = test_source;
+  if (scene) options->scene = scene;
   if (output_dir) options->output_dir = output_dir;
   if (rest && rest[0]) options->video = rest[0];
-  if (good && options->video.empty() && !options->test_source) {
-    std::fprintf(stderr, "Name a video, or --test-source.\n");
+  if (good && options->video.empty() && options->scene.empty()) {
+    std::fprintf(stderr, "Name a video, or a --scene.\n");
     good = false;
   }
   if (good && (frames < 0 || window_size < 2 || window_size > 2048)) {
@@ -79,6 +78,7 @@ bool parse(int argc, char** argv, Options* options) {
   }
   g_strfreev(rest);
   g_free(output_dir);
+  g_free(scene);
   return good;
 }
 
@@ -95,9 +95,9 @@ std::string pipeline_text(const Options& options) {
   for (const char* title : kTitles)
     labels += std::string(" ! textoverlay shaded-background=true font-desc=\"Sans 10\" text=") +
               title + " name=label-" + title + " halignment=left valignment=top xpad=0 ypad=0";
-  std::string text = options.test_source ? "videotestsrc pattern=ball num-buffers=300 ! "
-                                           "video/x-raw,width=320,height=240,framerate=25/1 ! "
-                                         : "filesrc name=file ! decodebin ! ";
+  std::string text = options.scene.empty() ? "filesrc name=file ! decodebin ! "
+                                           : "qdmdscenesrc name=scene num-buffers=300 ! "
+                                             "video/x-raw,width=320,height=240,framerate=25/1 ! ";
   // Square pixels: the compositor would widen others, and the pictures would overlap.
   text +=
       "videoconvert ! videoscale ! video/x-raw,format=RGBx,pixel-aspect-ratio=1/1 ! tee name=t "
@@ -278,8 +278,10 @@ int run(const Options& options) {
     return Ref<GstElement>(gst_bin_get_by_name(GST_BIN(pipeline.get()), name));
   };
   const auto path = [&](const char* name) { return options.output_dir + "/" + name; };
-  if (!options.test_source)
+  if (options.scene.empty())
     g_object_set(element("file").get(), "location", options.video.c_str(), nullptr);
+  else
+    g_object_set(element("scene").get(), "scene", options.scene.c_str(), nullptr);
   g_object_set(element("video").get(), "location", path("separated.mp4").c_str(), nullptr);
   const Ref<GstElement> grid = element("grid"), grids = element("grids"), tee = element("t"),
                         background = element("background");

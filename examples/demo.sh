@@ -15,8 +15,8 @@ tests/install-dependencies.sh build demo
 # The folder may have been configured before the packages for the demo were there.
 again=()
 [ ! -f build/build.ninja ] || again=(--reconfigure)
-meson setup "${again[@]}" build -Dexamples=enabled
-ninja -C build gst/libgstqdmd.so examples/qdmd-demo
+meson setup "${again[@]}" build -Dexamples=enabled -Dscene=enabled
+ninja -C build gst/libgstqdmd.so gst/libgstqdmdscene.so examples/qdmd-demo
 
 demo=build/demo
 mkdir -p "$demo"
@@ -48,9 +48,9 @@ else
   if [ ! -f "$cached" ]; then
     echo "Fetching the street scene vtest.avi from Debian's opencv-doc package"
     fetch_street_scene "$cached" ||
-      echo "The street scene could not be fetched (no network?): a moving ball is shown instead."
+      echo "The street scene could not be fetched (no network?): a simulated street is shown instead."
   fi
-  if [ -f "$cached" ]; then source=("$cached"); else source=(--test-source); fi
+  if [ -f "$cached" ]; then source=("$cached"); else source=(--scene basic,shadow,leaves); fi
 fi
 
 GST_PLUGIN_PATH_1_0="$PWD/build/gst" GST_REGISTRY_1_0="$PWD/build/demo-registry.bin" \

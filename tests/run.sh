@@ -34,7 +34,7 @@ echo "== build"
 # The folder may have been configured before the packages for the tests were there.
 again=()
 [ ! -f build/build.ninja ] || again=(--reconfigure)
-meson setup "${again[@]}" build -Dtests=enabled
+meson setup "${again[@]}" build -Dtests=enabled -Dscene=enabled
 ninja -C build
 
 echo "== test"

@@ -111,8 +111,7 @@ void Scene::paint_world() {
                    &state_.world);
 }
 
-void Scene::paint_objects(double time) {
-  place(time);
+void Scene::paint_objects() {
   const bool labels = state_.wants(kLabels), frame = state_.wants(kFrame);
   if (frame) state_.picture = state_.world;
   if (labels) {
@@ -167,9 +166,12 @@ void Scene::render(int64_t index, unsigned wanted) {
   place(state_.time);
   paint_world();
   if (state_.wants(kFrame) || state_.wants(kLabels)) {
-    if (stages_.expose.empty()) paint_objects(state_.time);
+    if (stages_.expose.empty()) paint_objects();
     for (Effect* effect : stages_.expose)
-      effect->expose(state_, [this](double time) { paint_objects(time); });
+      effect->expose(state_, [this](double time) {
+        place(time);
+        paint_objects();
+      });
   }
   if (state_.wants(kTruth)) state_.truth = state_.world;
   if (state_.wants(kFrame))
@@ -190,7 +192,7 @@ void Scene::render(int64_t index, unsigned wanted) {
     for (Effect* effect : stages_.sensor) effect->sensor(state_);
   if (state_.wants(kLabels)) to_labels(state_.shadow, &state_.coverage);
   if (state_.wants(kBoxes)) {
-    place(state_.time);
+    if (!stages_.expose.empty()) place(state_.time);
     find_boxes();
   }
 }

@@ -64,7 +64,7 @@ class Scene {
   double metered(double time);
   void place(double time);
   void paint_world();
-  void paint_objects(double time);
+  void paint_objects();
   void crop_to_frame();
   void find_boxes();
 
