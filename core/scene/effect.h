@@ -17,15 +17,14 @@ namespace qdmd::scene {
 // A frame goes through these in order. The true background takes part in world, lens, light and
 // meter, the mask in expose and lens.
 enum Stage : unsigned {
-  kPlan = 1 << 0,    // once: who moves, how fast time runs
-  kWorld = 1 << 1,   // the background of this frame
-  kGround = 1 << 2,  // what objects do to the background: shadows
-  kExpose = 1 << 3,  // how long the shutter is open while objects move
-  kAir = 1 << 4,     // between the objects and the camera
-  kLens = 1 << 5,    // where the picture falls, and how sharp
-  kLight = 1 << 6,   // how much light there is
-  kMeter = 1 << 7,   // what the camera's exposure makes of that
-  kSensor = 1 << 8,  // what happens to the picture after that
+  kWorld = 1 << 0,   // the background of this frame
+  kGround = 1 << 1,  // what objects do to the background: shadows
+  kExpose = 1 << 2,  // how long the shutter is open while objects move
+  kAir = 1 << 3,     // between the objects and the camera
+  kLens = 1 << 4,    // where the picture falls, and how sharp
+  kLight = 1 << 5,   // how much light there is
+  kMeter = 1 << 6,   // what the camera's exposure makes of that
+  kSensor = 1 << 7,  // what happens to the picture after that
 };
 
 enum Need : unsigned {
@@ -86,7 +85,8 @@ struct Plan {
   std::vector<std::unique_ptr<Actor>> actors;
 };
 
-// Each effect overrides the stages that its EffectInfo names, and only these are called.
+// Each effect overrides the stages that its EffectInfo names, and only these are called; plan() is
+// called once, before the first frame.
 class Effect {
  public:
   virtual ~Effect() = default;

@@ -42,7 +42,7 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
   for (size_t i = 0; i < named.size(); ++i) {
     Effect* effect = effects_[i].get();
     const unsigned stages = named[i].info->stages;
-    if (stages & kPlan) effect->plan(plan_);
+    effect->plan(plan_);
     if (stages & kWorld) stages_.world.push_back(effect);
     if (stages & kGround) stages_.ground.push_back(effect);
     if (stages & kExpose) stages_.expose.push_back(effect);

@@ -90,7 +90,7 @@ DmdOptions rank(int kept) {
 class Separation : public testing::TestWithParam<uint64_t> {};
 
 TEST_P(Separation, MaskIsTheMover) {
-  for (const char* text : {"default", "noise=3", "shadow", "low-rate=5"}) {
+  for (const char* text : {"default", "noise=3", "low-rate=5"}) {
     SCOPED_TRACE(text);
     const Score score = separate(text, rank(1), GetParam());
     EXPECT_GT(score.recall, 0.9);

@@ -50,7 +50,7 @@ constexpr Parameter kParameters[] = {
 const EffectInfo kAbandon = {"abandon",
                              "intermittent motion: a bag is left on the pavement and taken away "
                              "later; it is foreground as long as it is there",
-                             kPlan,
+                             0,
                              kRandom | kBuffers,
                              kParameters,
                              make_effect<Abandon>};

@@ -40,11 +40,8 @@ constexpr Parameter kParameters[] = {
 }  // namespace
 
 const EffectInfo kBands = {
-    "bands",
-    "rolling bands: lamps on mains flicker while the shutter rolls down the picture",
-    kPlan | kLight,
-    kBuffers,
-    kParameters,
-    make_effect<Bands>};
+    "bands",     "rolling bands: lamps on mains flicker while the shutter rolls down the picture",
+    kLight,      kBuffers,
+    kParameters, make_effect<Bands>};
 
 }  // namespace qdmd::scene

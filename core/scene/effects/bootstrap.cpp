@@ -56,7 +56,7 @@ constexpr Parameter kParameters[] = {
 
 const EffectInfo kBootstrap = {
     "bootstrap", "no frame without foreground: persons walk to and fro and never leave the frame",
-    kPlan,       kRandom | kBuffers,
+    0,           kRandom | kBuffers,
     kParameters, make_effect<Bootstrap>};
 
 }  // namespace qdmd::scene

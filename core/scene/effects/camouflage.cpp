@@ -31,9 +31,11 @@ constexpr Parameter kParameters[] = {
 
 }  // namespace
 
-const EffectInfo kCamouflage = {
-    "camouflage", "objects wear the mean colour of the background on their way",
-    kPlan,        0,
-    kParameters,  make_effect<Camouflage>};
+const EffectInfo kCamouflage = {"camouflage",
+                                "objects wear the mean colour of the background on their way",
+                                0,
+                                0,
+                                kParameters,
+                                make_effect<Camouflage>};
 
 }  // namespace qdmd::scene

@@ -76,7 +76,7 @@ const EffectInfo kClutter = {
     "clutter",
     "dense traffic: lorries cover every pixel of the rows from 45 to 90 % of "
     "the height for a given share of the time",
-    kPlan,
+    0,
     kRandom | kBuffers,
     kParameters,
     make_effect<Clutter>};

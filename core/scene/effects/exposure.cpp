@@ -51,8 +51,8 @@ constexpr Parameter kParameters[] = {
 }  // namespace
 
 const EffectInfo kExposure = {
-    "exposure",     "automatic exposure: the camera's gain follows the mean level, with a lag",
-    kPlan | kMeter, kBuffers,
-    kParameters,    make_effect<Exposure>};
+    "exposure",  "automatic exposure: the camera's gain follows the mean level, with a lag",
+    kMeter,      kBuffers,
+    kParameters, make_effect<Exposure>};
 
 }  // namespace qdmd::scene

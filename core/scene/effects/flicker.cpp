@@ -39,7 +39,7 @@ constexpr Parameter kParameters[] = {
 const EffectInfo kFlicker = {"flicker",
                              "moving background: a screen in the shop window shows another "
                              "brightness in every frame; it is background",
-                             kPlan | kWorld,
+                             kWorld,
                              kRandom,
                              kParameters,
                              make_effect<Flicker>};

@@ -65,7 +65,7 @@ constexpr Parameter kParameters[] = {
 const EffectInfo kLeaves = {
     "leaves",
     "moving background: the tree's leaves wave in the wind; waving leaves are background",
-    kPlan | kWorld,
+    kWorld,
     kRandom | kBuffers,
     kParameters,
     make_effect<Leaves>};

@@ -18,8 +18,7 @@ constexpr Parameter kParameters[] = {
 
 }  // namespace
 
-const EffectInfo kLength = {"length",    "the sequence ends after a number of frames",
-                            kPlan,       0,
-                            kParameters, make_effect<Length>};
+const EffectInfo kLength = {
+    "length", "the sequence ends after a number of frames", 0, 0, kParameters, make_effect<Length>};
 
 }  // namespace qdmd::scene

@@ -21,7 +21,7 @@ constexpr Parameter kParameters[] = {
 const EffectInfo kLowRate = {"low-rate",
                              "a slow camera: the scene goes on by 1 / rate seconds from frame to "
                              "frame, whatever the frame rate of the video is",
-                             kPlan,
+                             0,
                              0,
                              kParameters,
                              make_effect<LowRate>};

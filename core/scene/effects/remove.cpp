@@ -56,7 +56,7 @@ const EffectInfo kRemove = {
     "remove",
     "intermittent motion: a van that stands there from the first frame, and belongs to the "
     "background, drives off; it is foreground while it moves",
-    kPlan,
+    0,
     kRandom | kBuffers,
     kParameters,
     make_effect<Remove>};

@@ -21,7 +21,7 @@ constexpr Parameter kParameters[] = {
 const EffectInfo kStop = {
     "stop",
     "intermittent motion: whoever crosses the frame stands still in the middle, then goes on",
-    kPlan,
+    0,
     0,
     kParameters,
     make_effect<Stop>};

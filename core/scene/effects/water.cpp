@@ -67,8 +67,8 @@ constexpr Parameter kParameters[] = {
 }  // namespace
 
 const EffectInfo kWater = {
-    "water",        "moving background: waves on the canal; they are background",
-    kPlan | kWorld, kRandom | kBuffers,
-    kParameters,    make_effect<Water>};
+    "water",     "moving background: waves on the canal; they are background",
+    kWorld,      kRandom | kBuffers,
+    kParameters, make_effect<Water>};
 
 }  // namespace qdmd::scene
