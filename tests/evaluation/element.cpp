@@ -53,7 +53,7 @@ std::vector<std::string> element_methods() {
 
 std::pair<std::string, std::string> parse_property(const std::string& text) {
   const size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0)
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
     throw std::invalid_argument("'" + text + "' is not name=value");
   const std::string name = text.substr(0, equals), value = text.substr(equals + 1);
   if (name == "method" || name == "output")

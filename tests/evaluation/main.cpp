@@ -25,19 +25,19 @@ struct Options {
   std::string dataset, output_dir, resume, plugin = QDMD_PLUGIN;
   std::vector<std::string> sequences, methods, properties;
   Selection selection;
-  Picture picture = Picture::middle;
-  Format format = Format::text;
+  std::string picture = "middle", format = "text";
   bool in_process = false;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
+const std::map<std::string, Picture> kPictures{{"first", Picture::first},
+                                               {"middle", Picture::middle},
+                                               {"last", Picture::last},
+                                               {"median", Picture::median}};
+const std::map<std::string, Format> kFormats{
+    {"text", Format::text}, {"csv", Format::csv}, {"json", Format::json}};
+
 void declare(CLI::App& app, Options& options) {
-  const std::map<std::string, Picture> pictures{{"first", Picture::first},
-                                                {"middle", Picture::middle},
-                                                {"last", Picture::last},
-                                                {"median", Picture::median}};
-  const std::map<std::string, Format> formats{
-      {"text", Format::text}, {"csv", Format::csv}, {"json", Format::json}};
   app.add_option("--dataset", options.dataset,
                  "Folder of sequences in the layout of SBI, SBMnet or CDnet, or one sequence: "
                  "input/* are the frames in name order, gt/GT_* the true background")
@@ -62,9 +62,9 @@ void declare(CLI::App& app, Options& options) {
                  "Which L(t) is scored: that of the first, middle (default) or last frame, or the "
                  "median over all. mog2 and knn are scored after the last frame, mean and median "
                  "have one picture")
-      ->transform(CLI::CheckedTransformer(pictures));
+      ->check(CLI::IsMember({"first", "middle", "last", "median"}));
   app.add_option("--format", options.format, "Of the table on standard output: text, csv or json")
-      ->transform(CLI::CheckedTransformer(formats));
+      ->check(CLI::IsMember({"text", "csv", "json"}));
   app.add_option("--output-dir", options.output_dir,
                  "Write backgrounds as <sequence>_<method>.png and contact sheets as "
                  "<sequence>_sheet.png (error pictures are four times as bright)");
@@ -128,7 +128,7 @@ std::string settings_of(const Options& options) {
   std::string text = fingerprint(options.plugin) + fingerprint(fs::canonical("/proc/self/exe"));
   text += options.in_process ? "in-process\n" : "pipeline\n";
   for (const auto& property : options.properties) text += property + "\n";
-  return text + "picture " + std::to_string(static_cast<int>(options.picture)) + "\n";
+  return text + "picture " + options.picture + "\n";
 }
 
 int evaluate(const Options& options) {
@@ -141,7 +141,7 @@ int evaluate(const Options& options) {
   for (const auto& text : options.properties) element.properties.push_back(parse_property(text));
   plan.methods = choose_methods(all_methods(options, element), options.methods);
   plan.selection = options.selection;
-  plan.picture = options.picture;
+  plan.picture = kPictures.at(options.picture);
   plan.jobs = options.jobs;
   plan.settings = settings_of(options);
   plan.output_dir = options.output_dir;
@@ -159,7 +159,7 @@ int evaluate(const Options& options) {
     if (!sequence.frames.empty()) plan.sequences.push_back(sequence);
   }
   const std::vector<Row> rows = run(plan, progress);
-  write_table(rows, options.format, std::cout);
+  write_table(rows, kFormats.at(options.format), std::cout);
   std::cout.flush();
   return std::cout && progress.problems() == 0 ? 0 : 1;
 }
@@ -175,10 +175,14 @@ int main(int argc, char** argv) {
       "(shares, 0 to 1), similarity, and masks where the data set has them.");
   declare(app, options);
   app.footer([&options] {
-    std::string text = "Methods:";
-    load_plugin(options.plugin);
-    for (const auto& method : all_methods(options, {})) text += " " + method->name();
-    return text + ".";
+    try {
+      load_plugin(options.plugin);
+      std::string text = "Methods:";
+      for (const auto& method : all_methods(options, {})) text += " " + method->name();
+      return text;
+    } catch (const std::exception& error) {
+      return std::string(error.what());
+    }
   });
   try {
     app.parse(argc, argv);
