@@ -58,9 +58,11 @@ def sequences_of(run):
 # Name in the tables, run, method.
 def variants(runs):
     listed = [('qdmd', 'whole', 'qdmd'), ('qdmd, first-frame', 'whole-first-frame', 'qdmd'),
-              ('qdmd, rank 1', 'whole-rank-1', 'qdmd'), ('dmd', 'whole', 'dmd'),
+              ('qdmd, rank 1', 'whole-rank-1', 'qdmd'),
+              ('qdmd, omega 0.01', 'whole-neighbours', 'qdmd'), ('dmd', 'whole', 'dmd'),
               ('dmd, first-frame', 'whole-first-frame', 'dmd'),
-              ('dmd, rank 1', 'whole-rank-1', 'dmd')]
+              ('dmd, rank 1', 'whole-rank-1', 'dmd'),
+              ('dmd, omega 0.01', 'whole-neighbours', 'dmd')]
     known = {method for _, _, method in listed}
     for _, method in runs['whole']:
         if method not in known:
@@ -105,9 +107,9 @@ def masks(runs):
     return table(['sequence', 'method', 'precision', 'recall', 'F'], rows)
 
 
-def excerpts(runs, sequence, method, amplitude):
-    """AGE for each start frame; of the whole sequence where it has at most 200 frames."""
-    end = '-first-frame' if amplitude == 'first-frame' else ''
+def excerpts(runs, sequence, method, setting):
+    """A row for each start frame; that of the whole sequence where it has at most 200 frames."""
+    end = '' if setting == 'window' else '-' + setting
     found = [runs[f'excerpt-{sequence}-{k}{end}'][sequence, method] for k in range(5)
              if f'excerpt-{sequence}-{k}{end}' in runs]
     return found or [runs['whole' + end][sequence, method]]
@@ -122,8 +124,9 @@ def spread_cell(rows, measure='AGE'):
 
 def spread(runs):
     columns = [('qdmd', 'qdmd', 'window'), ('qdmd, first-frame', 'qdmd', 'first-frame'),
+               ('qdmd, omega 0.01', 'qdmd', 'neighbours'),
                ('dmd', 'dmd', 'window'), ('dmd, first-frame', 'dmd', 'first-frame'),
-               ('median', 'median', 'window')]
+               ('dmd, omega 0.01', 'dmd', 'neighbours'), ('median', 'median', 'window')]
     rows = []
     for sequence in sequences_of(runs['whole']):
         if f'excerpt-{sequence}-0' in runs:

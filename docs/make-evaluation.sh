@@ -33,6 +33,8 @@ rm -f "$results"/tables/*.json
 evaluate whole --output-dir "$results/whole"
 evaluate whole-first-frame --output-dir "$results/first-frame" --methods qdmd,dmd \
   --set amplitude=first-frame
+evaluate whole-neighbours --output-dir "$results/neighbours" --methods qdmd,dmd \
+  --set omega-threshold=0.01
 evaluate whole-rank-1 --output-dir "$results/rank-1" --methods qdmd,dmd --set rank=1
 for picture in first last median; do
   evaluate "picture-$picture" --methods qdmd,dmd --picture "$picture"
@@ -50,6 +52,8 @@ for folder in "$QDMD_DATA"/{SBI,SBMnet,CDnet}/*/; do
       --methods qdmd,dmd,median
     evaluate "excerpt-$sequence-$k-first-frame" --sequences "$sequence" --frames "$excerpt" \
       --start "$start" --methods qdmd,dmd --set amplitude=first-frame
+    evaluate "excerpt-$sequence-$k-neighbours" --sequences "$sequence" --frames "$excerpt" \
+      --start "$start" --methods qdmd,dmd --set omega-threshold=0.01
   done
 done
 
