@@ -47,6 +47,28 @@ TEST(Broken, IsNamedAndTheRestIsEvaluated) {
   EXPECT_EQ(row_of(table, "no-truth", "mean").at("frames"), 6);
 }
 
+TEST(Broken, PicturesThatAreCutOff) {
+  const Folder data;
+  for (const char* kind : {"png", "jpg"}) {
+    for (int t = 0; t < 4; ++t)
+      write(data / kind / "input" / ("in" + std::to_string(t) + "." + kind), frame_at(t));
+    write(data / kind / "gt" / (std::string("GT_x.") + kind), still_picture());
+  }
+  const Arguments arguments = {"--dataset", data.string(), "--methods", "mean", "--format", "json"};
+  const Result whole = evaluate(arguments);
+  EXPECT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_EQ(whole.json().size(), 2u);
+  for (const char* kind : {"png", "jpg"}) {
+    const fs::path frame = data / kind / "input" / (std::string("in2.") + kind);
+    fs::resize_file(frame, fs::file_size(frame) / 2);
+  }
+  const Result cut = evaluate(arguments);
+  EXPECT_EQ(cut.exit_code, 1);
+  EXPECT_TRUE(cut.says("png: cannot read input/in2.png")) << cut.err;
+  EXPECT_TRUE(cut.says("jpg: cannot read input/in2.jpg")) << cut.err;
+  EXPECT_EQ(cut.json().size(), 0u);
+}
+
 TEST(Broken, TruthAndMasksAreLeftOut) {
   const Folder data, out;
   write_sequence(data / "size", 6, true);

@@ -1,5 +1,7 @@
 #include "tests/evaluation/clip.h"
 
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
@@ -15,7 +17,20 @@ std::string size_text(const cv::Mat& picture) {
   return std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
 }
 
+// Decoders fill up what a JPEG lacks with grey and say nothing. In a whole one the end-of-image
+// marker FF D9 comes after the last start of scan FF DA; neither occurs in coded samples.
+bool is_cut_jpeg(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!bytes.starts_with("\xFF\xD8")) return false;
+  const size_t end = bytes.rfind("\xFF\xD9"), scan = bytes.rfind("\xFF\xDA");
+  return end == std::string::npos || scan == std::string::npos || end < scan;
+}
+
 cv::Mat read_picture(const fs::path& path, int flags, const fs::path& folder) {
+  if (is_cut_jpeg(path))
+    throw std::runtime_error("cannot read " + fs::relative(path, folder).string() +
+                             ", which is cut off");
   cv::Mat picture;
   try {
     picture = cv::imread(path.string(), flags);

@@ -159,6 +159,7 @@ int evaluate(const Options& options) {
     if (!sequence.frames.empty()) plan.sequences.push_back(sequence);
   }
   const std::vector<Row> rows = run(plan, progress);
+  progress.end();
   write_table(rows, kFormats.at(options.format), std::cout);
   std::cout.flush();
   return std::cout && progress.problems() == 0 ? 0 : 1;

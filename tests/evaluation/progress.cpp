@@ -35,6 +35,11 @@ size_t Progress::problems() const {
   return problems_;
 }
 
+void Progress::end() {
+  const std::lock_guard lock(mutex_);
+  clear_line();
+}
+
 void Progress::clear_line() {
   if (line_is_open_) std::fputs("\r\033[K", stderr);
   line_is_open_ = false;

@@ -16,6 +16,8 @@ class Progress {
   // A sentence that names its sequence; printed once.
   void problem(const std::string& sequence, const std::string& what);
   size_t problems() const;
+  // Ends the line on a terminal: other output follows.
+  void end();
 
  private:
   void clear_line();
