@@ -1,0 +1,123 @@
+#include "tests/evaluation/clip.h"
+
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "core/metrics/mask_scores.h"
+
+namespace qdmd::evaluation {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string size_text(const cv::Mat& picture) {
+  return std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
+}
+
+// Decoders fill up what a JPEG lacks with grey and say nothing. In a whole one the end-of-image
+// marker FF D9 comes after the last start of scan FF DA; neither occurs in coded samples.
+bool is_cut_jpeg(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!bytes.starts_with("\xFF\xD8")) return false;
+  const size_t end = bytes.rfind("\xFF\xD9"), scan = bytes.rfind("\xFF\xDA");
+  return end == std::string::npos || scan == std::string::npos || end < scan;
+}
+
+cv::Mat read_picture(const fs::path& path, int flags, const fs::path& folder) {
+  if (is_cut_jpeg(path))
+    throw std::runtime_error("cannot read " + fs::relative(path, folder).string() +
+                             ", which is cut off");
+  cv::Mat picture;
+  try {
+    picture = cv::imread(path.string(), flags);
+  } catch (const cv::Exception&) {
+    // An empty picture, as for any other unreadable file.
+  }
+  if (picture.empty())
+    throw std::runtime_error("cannot read " + fs::relative(path, folder).string());
+  return picture;
+}
+
+void require_size(const cv::Mat& picture, const fs::path& path, const cv::Mat& first,
+                  const fs::path& first_path, const fs::path& folder) {
+  if (picture.size() != first.size())
+    throw std::runtime_error(
+        "two sizes: " + fs::relative(path, folder).string() + " has " + size_text(picture) +
+        " pixels, " + fs::relative(first_path, folder).string() + " has " + size_text(first));
+}
+
+void read_labels(const Sequence& sequence, const std::vector<fs::path>& paths, Clip* clip) {
+  std::vector<cv::Mat> labels(paths.size());
+  bool any = false;
+  for (size_t i = 0; i < paths.size(); ++i) {
+    uint64_t number = 0;
+    if (!frame_number(paths[i], &number) || !sequence.masks.contains(number)) continue;
+    const fs::path& path = sequence.masks.at(number);
+    labels[i] = read_picture(path, cv::IMREAD_GRAYSCALE, sequence.folder);
+    require_size(labels[i], path, clip->frames[0], paths[0], sequence.folder);
+    try {
+      MaskCounts().add(labels[i].data, labels[i].data, labels[i].total());
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(fs::relative(path, sequence.folder).string() + ": " + error.what());
+    }
+    any = true;
+  }
+  if (any) clip->labels = std::move(labels);
+}
+
+template <typename Byte>
+BasicImageView<Byte> bgr_view(const cv::Mat& bgr) {
+  BasicImageView<Byte> view;
+  for (int c = 0; c < 3; ++c) view.channel[c] = bgr.data + 2 - c;
+  view.width = bgr.cols;
+  view.height = bgr.rows;
+  view.pixel_stride = 3;
+  view.row_stride = static_cast<ptrdiff_t>(bgr.step[0]);
+  return view;
+}
+
+}  // namespace
+
+std::vector<fs::path> Selection::of(const Sequence& sequence) const {
+  std::vector<fs::path> chosen;
+  for (size_t i = start; i < sequence.frames.size() && (frames == 0 || chosen.size() < frames);
+       i += every)
+    chosen.push_back(sequence.frames[i]);
+  return chosen;
+}
+
+Clip read_clip(const Sequence& sequence, const Selection& selection) {
+  const std::vector<fs::path> paths = selection.of(sequence);
+  if (paths.empty())
+    throw std::runtime_error("no frames are left: the sequence has " +
+                             std::to_string(sequence.frames.size()));
+  Clip clip;
+  for (const auto& path : paths) {
+    clip.frames.push_back(read_picture(path, cv::IMREAD_COLOR, sequence.folder));
+    require_size(clip.frames.back(), path, clip.frames[0], paths[0], sequence.folder);
+  }
+  try {
+    if (!sequence.truth.empty()) {
+      const cv::Mat truth = read_picture(sequence.truth, cv::IMREAD_COLOR, sequence.folder);
+      require_size(truth, sequence.truth, clip.frames[0], paths[0], sequence.folder);
+      clip.truth = truth;
+    }
+  } catch (const std::runtime_error& error) {
+    clip.problems.push_back(std::string("truth left out, ") + error.what());
+  }
+  try {
+    read_labels(sequence, paths, &clip);
+  } catch (const std::runtime_error& error) {
+    clip.problems.push_back(std::string("masks left out, ") + error.what());
+  }
+  return clip;
+}
+
+ImageView view_of(const cv::Mat& bgr) { return bgr_view<const uint8_t>(bgr); }
+MutableImageView view_of(cv::Mat& bgr) { return bgr_view<uint8_t>(bgr); }
+
+}  // namespace qdmd::evaluation

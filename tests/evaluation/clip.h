@@ -1,0 +1,36 @@
+// The pictures of a sequence in memory.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "core/background/image_view.h"
+#include "tests/evaluation/dataset.h"
+
+namespace qdmd::evaluation {
+
+// Which frames of a sequence are used: from `start` (0 is the first) every `every`-th one, `frames`
+// of them at most (0: all).
+struct Selection {
+  size_t start = 0, every = 1, frames = 0;
+
+  std::vector<std::filesystem::path> of(const Sequence& sequence) const;
+};
+
+struct Clip {
+  std::vector<cv::Mat> frames;  // 8-bit BGR, all of one size
+  cv::Mat truth;                // 8-bit BGR of that size; empty: none
+  std::vector<cv::Mat> labels;  // of frames with a mask, 8-bit; others empty. No elements: no masks
+  std::vector<std::string> problems;  // why a truth or masks had to be left out
+};
+
+// Throws std::runtime_error that names the file where a frame cannot be read or has another size
+// than the first one, and where the selection has no frame.
+Clip read_clip(const Sequence& sequence, const Selection& selection);
+
+// An 8-bit BGR picture of OpenCV for the core.
+ImageView view_of(const cv::Mat& bgr);
+MutableImageView view_of(cv::Mat& bgr);
+
+}  // namespace qdmd::evaluation
