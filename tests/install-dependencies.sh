@@ -6,7 +6,7 @@
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
-  libeigen3-dev)
+  libeigen3-dev libhwy-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters; OpenCV is for
 # the scene source and the evaluation.
 test=(python3 python3-numpy clang-format libgtest-dev libbenchmark-dev libboost-dev libopencv-dev

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
+
+#include "core/gram/tile_kernel.h"
 
 namespace qdmd {
 namespace {
@@ -59,11 +62,17 @@ void reference(const uint8_t* const* rows, size_t row_count, const uint8_t* cons
     }
 }
 
-constexpr Kernel kKernels[] = {{"widened", widened}, {"reference", reference}};
-
 }  // namespace
 
-std::span<const Kernel> kernels() { return kKernels; }
+std::span<const Kernel> kernels() {
+  static const std::vector<Kernel> kKernels = [] {
+    std::vector<Kernel> all = tile_kernels();
+    all.push_back({"widened", widened});
+    all.push_back({"reference", reference});
+    return all;
+  }();
+  return kKernels;
+}
 
 void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
                   size_t col_count, size_t length, int64_t* out) noexcept {

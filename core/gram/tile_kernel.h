@@ -1,0 +1,13 @@
+// Inner products by register tiles, for each vector instruction set.
+#pragma once
+
+#include <vector>
+
+#include "core/gram/kernel.h"
+
+namespace qdmd {
+
+// Those that this machine can run, the fastest first. May be empty.
+std::vector<Kernel> tile_kernels();
+
+}  // namespace qdmd
