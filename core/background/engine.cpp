@@ -13,7 +13,7 @@ namespace {
 
 // Frames that enter the Gram matrix together: few enough that little is left to do when a window is
 // full, enough that the window is not read from memory for every frame.
-constexpr int kGramGroup = 4;
+constexpr int kGramGroup = 16;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
