@@ -77,16 +77,19 @@ TEST(SceneBands, RowsFollowASineOfTheRightPeriod) {
     const Shot shot = shoot(&banded, k), still = shoot(&plain, k);
     std::vector<double> profile;
     for (size_t y = 0; y < kHeight; ++y) {
-      double lit = 0, dark = 0;
-      for (size_t i = y * kWidth * 3; i < (y + 1) * kWidth * 3; ++i)
-        lit += shot.background[i], dark += still.background[i];
+      double lit = 0, dark = 0, samples = 0;
+      for (size_t i = y * kWidth * 3; i < (y + 1) * kWidth * 3; ++i) {
+        // Brighter ones are clipped.
+        if (still.background[i] > 230) continue;
+        lit += shot.background[i], dark += still.background[i], ++samples;
+      }
       profile.push_back(lit / dark - 1);
       // 120 Hz, seen by rows that follow each other by 0.8 / 25 / 240 s.
       const double time = static_cast<double>(k) / 25 + static_cast<double>(y) * 0.8 / 25 / kHeight;
       const double expected = 0.1 * std::sin(2 * std::numbers::pi * 120 * time);
       EXPECT_NEAR(shot.rows[y] - 1, expected, 1e-9);
       // Half a level of rounding in the mean of the row.
-      EXPECT_NEAR(profile[y], expected, 0.5 * kWidth * 3 / dark) << k << " row " << y;
+      EXPECT_NEAR(profile[y], expected, 0.5 * samples / dark) << k << " row " << y;
     }
     // Of all periods the profile has most of the one of 240 / 3.84 rows.
     double best = 0, best_turns = 0;
@@ -347,9 +350,9 @@ TEST(SceneCompression, HasBlocksAndLosesMoreAtLowerQuality) {
   }
   // Errors of two blocks have nothing to do with each other; inside of one they are smooth waves.
   const Coded coarse = coded("compression=5");
-  EXPECT_GT(coarse.at_blocks, 1.1 * coarse.inside);
-  // Without a codec there is no error to speak of.
-  EXPECT_LT(last, 2);
+  EXPECT_GT(coarse.at_blocks, 1.5 * coarse.inside);
+  // At 100 % next to nothing is left but the coarser colours.
+  EXPECT_LT(last, coarse.error / 20);
   EXPECT_EQ(coded("default").error, 0);
 }
 
