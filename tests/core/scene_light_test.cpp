@@ -46,6 +46,18 @@ TEST(SceneLightSwitch, SwitchesEveryFewSeconds) {
     }
 }
 
+TEST(SceneLightSwitch, RoundedTimesAreNoFrameLate) {
+  for (const auto& [rate, tenths] : {std::pair{30, 1}, {30, 7}, {60, 3}, {10, 3}, {20, 9}}) {
+    Scene scene(options(2, 2, rate), "light-switch:seconds=0." + std::to_string(tenths));
+    for (int64_t k = 0; k < 5000; ++k) {
+      scene.render(k, scene::kBoxes);
+      // In integers: k / rate seconds hold so many whole switches.
+      const bool dark = k * 10 / (rate * tenths) % 2 == 1;
+      ASSERT_NEAR(scene.light().gain[0], dark ? 0.65 : 1, 1e-9) << rate << " f/s, frame " << k;
+    }
+  }
+}
+
 TEST(SceneNight, LeavesLittleBlueLight) {
   for (const auto& [light, gain] : {std::pair{0.04, 18.0}, {0.2, 6.0}, {0.01, 40.0}}) {
     Scene night(options(64, 48),
