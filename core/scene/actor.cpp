@@ -28,6 +28,10 @@ Person::Person(int height, Stream& stream, const Dress& dress, const Box& region
   }
 }
 
+int person_height(int frame_width, int wanted) {
+  return std::clamp(wanted, 1, static_cast<int>(frame_width / kWidthOfPerson) + 1);
+}
+
 const Sprite& Person::at(double walked, bool forward) const {
   // Two steps take about the height of a person.
   const double step = walked / std::max(height(), 1);
@@ -39,7 +43,7 @@ Crossing::Crossing(int width, int height, double pause, const StreamSource& stre
                    const Dress& dress)
     : width_(width), height_(height), pause_(pause), streams_(streams) {
   Stream stream = streams.at(StreamSource::kSetup);
-  const int person = std::max(1, static_cast<int>(std::lround(kHeight * height)));
+  const int person = person_height(width, static_cast<int>(std::lround(kHeight * height)));
   const int top = static_cast<int>(kFarFeet * height) - person;
   const Box region{0, top, width, static_cast<int>(kNearFeet * height) - top};
   people_.reserve(kPeople);
@@ -57,9 +61,9 @@ void Crossing::place(double time, std::vector<Placement>* placements) const {
   const Person& person = people_[static_cast<size_t>(stream.index(kPeople))];
   const double feet = stream.uniform(kFarFeet, kNearFeet) * height_;
   const bool forward = number % 2 == 0;
-  // From just outside on one side to just outside on the other.
-  const double way = moving / kCrossing * (width_ + person.width());
-  const double x = forward ? way - person.width() : width_ - way;
+  const double beyond = kBeyond * width_;
+  const double way = moving / kCrossing * (width_ + person.width() + 2 * beyond);
+  const double x = forward ? way - person.width() - beyond : width_ + beyond - way;
   placements->push_back({&person.at(way, forward), static_cast<int>(std::lround(x)),
                          static_cast<int>(std::lround(feet)) - person.height()});
 }

@@ -49,6 +49,13 @@ class Person {
   std::vector<Sprite> forward_, backward_;
 };
 
+// At most `wanted`, at least 1, and no wider than the frame.
+int person_height(int frame_width, int wanted);
+
+// How far beyond the frame those who leave it go, in its widths: a camera that shakes sees a little
+// of what is beside it.
+inline constexpr double kBeyond = 0.05;
+
 // The mover of the default scene: persons cross the frame, one after the other, in turn from the
 // left and from the right. Crossing takes kCrossing seconds, and `pause` more in the middle.
 class Crossing : public Actor {

@@ -157,13 +157,13 @@ Backdrop::Backdrop(int width, int height, int margin, const StreamSource& stream
 }
 
 std::array<double, 3> Backdrop::mean(const Box& wanted) const {
-  const Box canvas{0, 0, picture_.width, picture_.height};
-  Box box = intersection(canvas, wanted);
-  if (box.empty()) box = canvas;
+  const Box frame{0, 0, picture_.width - 2 * margin_, picture_.height - 2 * margin_};
+  Box box = intersection(frame, wanted);
+  if (box.empty()) box = frame;
   std::array<double, 3> sum{};
   for (int y = box.y; y < box.bottom(); ++y)
     for (int x = box.x; x < box.right(); ++x)
-      for (size_t c = 0; c < 3; ++c) sum[c] += picture_.at(x, y)[c];
+      for (size_t c = 0; c < 3; ++c) sum[c] += picture_.at(x + margin_, y + margin_)[c];
   for (auto& value : sum) value /= static_cast<double>(box.width) * box.height;
   return sum;
 }

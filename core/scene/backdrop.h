@@ -21,7 +21,8 @@ class Backdrop {
   const Box& canal() const { return canal_; }
   const Box& shop_window() const { return shop_window_; }
 
-  // The mean level of a box of the canvas, per channel; of the whole canvas where it is empty.
+  // The mean level of a box, in the frame's coordinates, per channel; of the whole frame where no
+  // part of the box is in it.
   std::array<double, 3> mean(const Box& box) const;
 
  private:

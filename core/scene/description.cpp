@@ -61,6 +61,7 @@ std::string list_of_parameters(const EffectInfo& info) {
     text << separator << parameter.name << " from " << parameter.minimum << " to "
          << parameter.maximum;
     if (*parameter.unit) text << ' ' << parameter.unit;
+    if (parameter.whole) text << " (whole numbers)";
     separator = ", ";
   }
   text << ", as in " << info.name << '=' << info.parameters.front().standard;
@@ -88,7 +89,8 @@ void set_value(const EffectInfo& info, std::string_view name, std::string_view t
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
-      value < parameter->minimum || value > parameter->maximum)
+      value < parameter->minimum || value > parameter->maximum ||
+      (parameter->whole && value != std::floor(value)))
     refuse("\"", text, "\" is no value for ", info.name, "'s ", parameter->name, ": ",
            list_of_parameters(info));
   (*values)[static_cast<size_t>(parameter - info.parameters.begin())] = value;
@@ -128,13 +130,14 @@ std::vector<NamedEffect> parse_scene(std::string_view text) {
   };
   if (trimmed(text).empty()) return scene;
   for (const std::string_view item : split(text, ',')) {
+    const std::string_view name = trimmed(item.substr(0, item.find_first_of("=:")));
     const auto preset = std::find_if(presets().begin(), presets().end(),
-                                     [&](const Preset& p) { return item == p.name; });
+                                     [&](const Preset& p) { return name == p.name; });
     if (preset != presets().end()) {
+      if (name != item) refuse("The preset ", name, " takes no value. ", list_of_names());
       for (auto& effect : parse_scene(preset->effects)) put(std::move(effect));
       continue;
     }
-    const std::string_view name = trimmed(item.substr(0, item.find_first_of("=:")));
     const auto info = std::find_if(effects().begin(), effects().end(),
                                    [&](const EffectInfo* e) { return name == e->name; });
     if (info == effects().end())

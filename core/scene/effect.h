@@ -110,6 +110,7 @@ struct Parameter {
   const char* unit;
   double standard, minimum, maximum;
   const char* description;
+  bool whole = false;  // only whole numbers
 };
 
 // The values of an effect's parameters, in the order of its EffectInfo, each inside its range.

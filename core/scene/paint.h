@@ -1,6 +1,8 @@
 // Pixel work that every scene needs: sprites onto pictures, cropping, light.
 #pragma once
 
+#include <cmath>
+
 #include "core/scene/actor.h"
 #include "core/scene/effect.h"
 #include "core/scene/raster.h"
@@ -22,6 +24,20 @@ void visit_runs(const Sprite& sprite, int x, int y, int width, int height, Visit
 // (x, y) in the canvas's coordinates.
 void paint_sprite(const Sprite& sprite, int x, int y, Picture* canvas);
 void paint_coverage(const Sprite& sprite, int x, int y, Plane* canvas);
+
+// What falls into the frame at (x, y), in its coordinates, falls again one `width` and one `height`
+// farther on over the whole canvas, however large that is: calls `paint(x, y)`, in the canvas's
+// coordinates, for each that comes nearer than `reach` to the canvas.
+template <typename Paint>
+void repeat_over_canvas(const FrameState& state, double x, double y, double width, double height,
+                        double reach, Paint paint) {
+  const auto first = [&](double at, double period) {
+    return at - period * std::floor((at + state.margin + reach) / period);
+  };
+  for (double v = first(y, height); v < state.height + state.margin + reach; v += height)
+    for (double u = first(x, width); u < state.width + state.margin + reach; u += width)
+      paint(u + state.margin, v + state.margin);
+}
 
 // The frame out of a canvas, looked at beside its place by a fraction of pixels: bilinear between
 // the four neighbours. (left, top) of the canvas is the frame's first pixel at shift 0; shifts stay

@@ -14,8 +14,10 @@ void check(const SceneOptions& options) {
       options.height > longest)
     throw std::invalid_argument("A scene has sides of 1 to " + std::to_string(longest) +
                                 " pixels: change width and height.");
-  if (!(options.frames_per_second > 0) || !std::isfinite(options.frames_per_second))
-    throw std::invalid_argument("A scene needs a frame rate above 0: change frames_per_second.");
+  if (!(options.frames_per_second >= 1e-3 && options.frames_per_second <= 1e6))
+    throw std::invalid_argument(
+        "A scene needs 0.001 to 1000000 frames/s: change frames_per_second, which is the framerate "
+        "of the caps.");
 }
 
 }  // namespace
@@ -100,6 +102,7 @@ void Scene::paint_world() {
   const bool any_part = std::any_of(placements_.begin(), placements_.end(),
                                     [](const Placement& p) { return p.part_of_background; });
   const bool moves = any_part || !stages_.world.empty();
+  world_holds_parts_ = any_part;
   // A world that stands still was painted when the scene was made.
   if (moves || world_moves_) state_.world = backdrop_->picture();
   world_moves_ = moves;
@@ -170,6 +173,9 @@ void Scene::render(int64_t index, unsigned wanted) {
     for (Effect* effect : stages_.expose)
       effect->expose(state_, [this](double time) {
         place(time);
+        // The world is that of the frame's time: who has left it by then is an object before, too.
+        if (!world_holds_parts_)
+          for (Placement& placement : placements_) placement.part_of_background = false;
         paint_objects();
       });
   }

@@ -11,7 +11,7 @@ namespace qdmd::scene {
 
 struct SceneOptions {
   int width = 320, height = 240;  // pixels, 1 .. kMaxSide
-  double frames_per_second = 25;  // above 0
+  double frames_per_second = 25;  // 0.001 to 1000000
   uint64_t seed = 0;
   std::vector<DrawRecord>* draw_log = nullptr;  // if not null, gets what each stream drew
 
@@ -41,7 +41,7 @@ class Scene {
   // Frames of the scene; 0: endless.
   int64_t length() const { return plan_.length; }
 
-  // Makes what `wanted` (of Wanted) names of frame `index` >= 0. Valid until the next call.
+  // Makes what `wanted` (of Wanted) names of frame `index`, 0 .. 2^40. Valid until the next call.
   void render(int64_t index, unsigned wanted);
 
   const Picture& frame() const { return state_.picture; }
@@ -49,7 +49,7 @@ class Scene {
   const Picture& background() const { return state_.truth; }
   // width x height labels.
   const Plane& labels() const { return state_.coverage; }
-  // Of every object of which some pixel may be in the frame.
+  // Of every object of which some pixel may be in the frame, without the blur of lens and shutter.
   const std::vector<Box>& boxes() const { return boxes_; }
   const Light& light() const { return state_.light; }
   // Pixels by which the camera looks to the right and down of its place.
@@ -73,7 +73,7 @@ class Scene {
   std::unique_ptr<Backdrop> backdrop_;
   Plan plan_;
   Stages stages_;
-  bool world_moves_ = false;
+  bool world_moves_ = false, world_holds_parts_ = false;
   FrameState state_;
   std::vector<Placement> placements_, metered_placements_;
   Picture cropped_;

@@ -78,7 +78,7 @@ Sprite draw_person(int height, const Colour& coat, const Colour& trousers, doubl
     }
     return std::nullopt;
   };
-  return rasterize(static_cast<int>(std::lround(0.42 * height)), height, coat, paint);
+  return rasterize(static_cast<int>(std::lround(kWidthOfPerson * height)), height, coat, paint);
 }
 
 Sprite draw_van(int width, int height, const Colour& paint_colour) {

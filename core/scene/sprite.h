@@ -23,6 +23,9 @@ struct Sprite {
   int height() const { return picture.height; }
 };
 
+// A person's width over the height.
+inline constexpr double kWidthOfPerson = 0.42;
+
 // A walking person at `phase` (0 .. 1) of the step. At least one pixel is opaque in every sprite.
 Sprite draw_person(int height, const Colour& coat, const Colour& trousers, double phase);
 // A van seen from the side.

@@ -157,7 +157,7 @@ TEST(SceneIndependence, NoEffectChangesTheDrawsOfAnother) {
 }
 
 // Rain and snow draw as many drops and flakes as the canvas holds, margin included.
-TEST(SceneIndependence, DISABLED_TheMarginDoesNotChangeTheWeather) {
+TEST(SceneIndependence, TheMarginDoesNotChangeTheWeather) {
   for (const char* effect : {"jitter", "defocus"})
     for (const char* other : {"rain", "snow"}) expect_same_draws(effect, other);
 }
@@ -246,7 +246,7 @@ TEST(SceneIndependence, ACanvasLargerThanTheFrameChangesNothing) {
 
 // Twigs are counted from the canvas's corner, waves clamped at its edge, weather spread over it,
 // and the exposure's target is its mean, so that jitter=0, with a margin of 1, changes them.
-TEST(SceneIndependence, DISABLED_ACanvasLargerThanTheFrameChangesNothingInTheseEither) {
+TEST(SceneIndependence, ACanvasLargerThanTheFrameChangesNothingInTheseEither) {
   for (const char* name : kSeesTheMargin)
     if (std::string(name) != "storm") expect_no_change("jitter=0", name);
 }

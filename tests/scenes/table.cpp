@@ -13,8 +13,9 @@ void print_effect(const EffectInfo& info) {
   std::printf("\n### %s\n\n%s.\n\n", info.name, info.description);
   std::printf("| parameter | unit | default | range | meaning |\n|---|---|---|---|---|\n");
   for (const Parameter& parameter : info.parameters)
-    std::printf("| `%s` | %s | %g | %g to %g | %s |\n", parameter.name, parameter.unit,
-                parameter.standard, parameter.minimum, parameter.maximum, parameter.description);
+    std::printf("| `%s` | %s | %g | %g to %g%s | %s |\n", parameter.name, parameter.unit,
+                parameter.standard, parameter.minimum, parameter.maximum,
+                parameter.whole ? ", whole" : "", parameter.description);
   print_picture(info.name);
 }
 

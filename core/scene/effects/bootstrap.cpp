@@ -11,7 +11,8 @@ class Stroller : public Actor {
       : person_(height_in(plan), stream, plan.dress,
                 {0, plan.height / 4, plan.width, plan.height * 5 / 8}),
         path_(std::max(plan.width - person_.width(), 0)),
-        top_(static_cast<int>(stream.uniform(0.66, 0.90) * plan.height) - person_.height()),
+        top_(std::max(
+            0, static_cast<int>(stream.uniform(0.66, 0.90) * plan.height) - person_.height())),
         speed_(stream.uniform(0.08, 0.2) * plan.width),
         start_(stream.uniform(0, 2.0 * path_)) {}
 
@@ -24,7 +25,7 @@ class Stroller : public Actor {
   }
 
  private:
-  static int height_in(const Plan& plan) { return std::max(1, plan.height * 2 / 5); }
+  static int height_in(const Plan& plan) { return person_height(plan.width, plan.height * 2 / 5); }
 
   Person person_;
   int path_, top_;
@@ -49,7 +50,7 @@ class Bootstrap : public Effect {
 };
 
 constexpr Parameter kParameters[] = {
-    {"persons", "", 3, 1, 50, "how many"},
+    {"persons", "", 3, 1, 50, "how many", true},
 };
 
 }  // namespace

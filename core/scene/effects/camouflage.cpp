@@ -13,9 +13,7 @@ class Camouflage : public Effect {
   void plan(Plan& plan) override {
     plan.dress = [backdrop = plan.backdrop, contrast = contrast_](const Sprite& sprite,
                                                                   const Box& region) {
-      const int margin = backdrop->margin();
-      auto mean =
-          backdrop->mean({region.x + margin, region.y + margin, region.width, region.height});
+      auto mean = backdrop->mean(region);
       for (auto& level : mean) level += contrast;
       return repainted(sprite, mean, kTexture);
     };

@@ -14,7 +14,10 @@ constexpr double kWidth = 0.35;                // of a lorry, in widths of the f
 class Traffic : public Actor {
  public:
   Traffic(const Plan& plan, double share, double speed, const StreamSource& streams)
-      : streams_(streams), frame_width_(plan.width), speed_(speed * plan.width) {
+      : streams_(streams),
+        frame_width_(plan.width),
+        margin_(plan.backdrop->margin()),
+        speed_(speed * plan.width) {
     top_ = static_cast<int>(std::lround(kTop * plan.height));
     const int height = std::max(1, static_cast<int>(std::lround(kBottom * plan.height)) - top_);
     const int width = std::max(1, static_cast<int>(std::lround(kWidth * plan.width)));
@@ -32,20 +35,21 @@ class Traffic : public Actor {
   void place(double time, std::vector<Placement>* placements) const override {
     // Slot i begins at i slot_ + way.
     const double way = time * speed_;
-    const auto first = static_cast<int64_t>(std::floor(-way / slot_)) - 1;
+    const auto first = static_cast<int64_t>(std::floor((-way - margin_) / slot_)) - 1;
     for (int64_t i = first;; ++i) {
       const double begin = static_cast<double>(i) * slot_ + way;
-      if (begin >= frame_width_) break;
+      if (begin >= frame_width_ + margin_) break;
       Stream stream = streams_.unlogged(i);
       const Sprite& lorry = lorries_[static_cast<size_t>(stream.index(kLorries))];
       const double x = begin + stream.uniform() * (slot_ - lorry.width());
+      if (x < -margin_ - lorry.width() || x > frame_width_ + margin_) continue;
       placements->push_back({&lorry, static_cast<int>(std::floor(x)), top_});
     }
   }
 
  private:
   StreamSource streams_;
-  int frame_width_, top_;
+  int frame_width_, margin_, top_;
   double speed_, slot_;
   std::vector<Sprite> lorries_;
 };

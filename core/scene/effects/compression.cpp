@@ -27,7 +27,7 @@ class Compression : public Effect {
 };
 
 constexpr Parameter kParameters[] = {
-    {"quality", "percent", 30, 1, 100, "of JPEG, as libjpeg counts it"},
+    {"quality", "percent", 30, 1, 100, "of JPEG, as libjpeg counts it", true},
 };
 
 }  // namespace

@@ -41,7 +41,7 @@ class Defocus : public Effect {
     cv::dilate(matrix(plane), touched_, cv::Mat::ones(side, side, CV_8U));
     blur(plane);
     cv::Mat samples = matrix(plane);
-    cv::max(samples, touched_ / 255, samples);
+    cv::max(samples, cv::min(touched_, 1), samples);
   }
 
   double deviation_;

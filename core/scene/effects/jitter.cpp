@@ -28,7 +28,9 @@ class Jitter : public Effect {
   }
 
   // The waves' crests may meet.
-  int margin() const override { return static_cast<int>(std::ceil(amplitude_ * kWaves)) + 1; }
+  int margin() const override {
+    return amplitude_ > 0 ? static_cast<int>(std::ceil(amplitude_ * kWaves)) + 1 : 0;
+  }
 
   void lens(FrameState& state) override {
     state.shift_x += shift(waves_[0], state.time);

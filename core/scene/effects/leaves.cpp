@@ -36,7 +36,8 @@ class Leaves : public Effect {
         const double u = (x + 0.5 - box.x) / box.width * 2 - 1;
         const double v = (y + 0.5 - box.y) / box.height * 2 - 1;
         if (u * u + v * v >= 1) continue;
-        const auto twig = static_cast<size_t>((x / side + y / side * 7) % kTwigs);
+        const auto twig =
+            static_cast<size_t>(((x - box.x) / side + (y - box.y) / side * 7) % kTwigs);
         const int from_x = std::clamp(x + moved_[twig][0], box.x, box.right() - 1);
         const int from_y = std::clamp(y + moved_[twig][1], box.y, box.bottom() - 1);
         std::copy_n(still.at(from_x, from_y), 3, state.world.at(x, y));

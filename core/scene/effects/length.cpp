@@ -13,7 +13,7 @@ class Length : public Effect {
 };
 
 constexpr Parameter kParameters[] = {
-    {"frames", "frames", 100, 1, 1e9, "frames of the sequence"},
+    {"frames", "frames", 100, 1, 1e9, "frames of the sequence", true},
 };
 
 }  // namespace

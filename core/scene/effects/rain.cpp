@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/scene/paint.h"
+
 namespace qdmd::scene {
 namespace {
 
@@ -15,24 +17,31 @@ class Rain : public Effect {
   void air(FrameState& state) override {
     Picture& picture = state.picture;
     Stream stream = streams_.at(state.index);
-    // As many as the frame has, on a canvas that may be larger.
-    const double area = static_cast<double>(picture.width) * picture.height / 1000;
+    const double area = static_cast<double>(state.width) * state.height / 1000;
     const auto drops = static_cast<int64_t>(area * density_ + stream.uniform());
     const int length = std::max(1, static_cast<int>(std::lround(length_ * state.height)));
     for (int64_t i = 0; i < drops; ++i) {
-      const double x = stream.uniform() * picture.width;
-      const int top = static_cast<int>(stream.uniform() * (picture.height + length)) - length;
+      const double x = stream.uniform() * state.width;
+      const double top = stream.uniform() * (state.height + length) - length;
       const double bright = brightness_ * stream.uniform(0.4, 1);
-      for (int k = 0; k < length; ++k) {
-        const int column = static_cast<int>(std::floor(x - kSlant * k)), row = top + k;
-        if (row < 0 || row >= picture.height || column < 0 || column >= picture.width) continue;
-        uint8_t* pixel = picture.at(column, row);
-        for (int c = 0; c < 3; ++c) pixel[c] = to_level(pixel[c] + bright);
-      }
+      repeat_over_canvas(state, x, top, state.width, state.height + length, length,
+                         [&](double left, double upper) {
+                           paint(left, static_cast<int>(std::floor(upper)), length, bright,
+                                 &picture);
+                         });
     }
   }
 
  private:
+  static void paint(double x, int top, int length, double bright, Picture* picture) {
+    for (int k = 0; k < length; ++k) {
+      const int column = static_cast<int>(std::floor(x - kSlant * k)), row = top + k;
+      if (row < 0 || row >= picture->height || column < 0 || column >= picture->width) continue;
+      uint8_t* pixel = picture->at(column, row);
+      for (int c = 0; c < 3; ++c) pixel[c] = to_level(pixel[c] + bright);
+    }
+  }
+
   double density_, length_, brightness_;
   StreamSource streams_;
 };

@@ -15,7 +15,7 @@ class ParkedVan : public Actor {
   void place(double time, std::vector<Placement>* placements) const override {
     const double driven = std::max(0.0, time - at_);
     const double way = std::min(0.5 * kAcceleration * driven * driven, 3.0) * width_;
-    if (x_ + way > width_) return;
+    if (x_ + way > (1 + kBeyond) * width_) return;
     placements->push_back({&sprite_, x_ + static_cast<int>(std::lround(way)), y_, time < at_});
   }
 

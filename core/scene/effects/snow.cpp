@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/scene/paint.h"
+
 namespace qdmd::scene {
 namespace {
 
@@ -13,21 +15,24 @@ class Snow : public Effect {
   Snow(Values values, const StreamSource& streams)
       : density_(values[0]), size_(values[1]), speed_(values[2]), streams_(streams) {}
 
-  // Every flake falls for ever, over and over through the canvas; its way follows from its draws.
+  // Every flake falls for ever, over and over through the frame; its way follows from its draws.
   void air(FrameState& state) override {
-    Picture& picture = state.picture;
     Stream stream = streams_.at(StreamSource::kSetup);
-    const double area = static_cast<double>(picture.width) * picture.height / 1000;
+    const double area = static_cast<double>(state.width) * state.height / 1000;
     const auto flakes = static_cast<int64_t>(std::lround(area * density_));
     for (int64_t i = 0; i < flakes; ++i) {
       const double start_x = stream.uniform(), start_y = stream.uniform();
       const double near = stream.uniform(0.5, 1), phase = stream.uniform();
       const double radius = std::max(0.5, near * size_ * state.height / 2);
-      const double fallen = start_y + near * speed_ * state.time * state.height / picture.height;
-      const double y = (fallen - std::floor(fallen)) * (picture.height + 2 * radius) - radius;
+      const double fallen = start_y + near * speed_ * state.time;
+      const double height = state.height + 2 * radius;
+      const double y = (fallen - std::floor(fallen)) * height - radius;
       const double drift = 0.02 * std::sin(2 * std::numbers::pi * (phase + 0.4 * state.time));
       const double across = start_x + drift - std::floor(start_x + drift);
-      paint(across * picture.width, y, radius, &picture);
+      repeat_over_canvas(state, across * state.width, y, state.width, height, radius,
+                         [&](double centre_x, double centre_y) {
+                           paint(centre_x, centre_y, radius, &state.picture);
+                         });
     }
   }
 

@@ -14,6 +14,9 @@ class Water : public Effect {
   Water(Values values, const StreamSource& streams)
       : amplitude_(values[0]), frequency_(values[1]), streams_(streams) {}
 
+  // Waves show what is beside the frame.
+  int margin() const override { return static_cast<int>(std::ceil(2 * amplitude_)); }
+
   void plan(Plan& plan) override {
     backdrop_ = plan.backdrop;
     Stream stream = streams_.at(StreamSource::kSetup);
@@ -68,7 +71,7 @@ constexpr Parameter kParameters[] = {
 
 const EffectInfo kWater = {
     "water",     "moving background: waves on the canal; they are background",
-    kWorld,      kRandom | kBuffers,
+    kWorld,      kRandom | kWarp | kBuffers,
     kParameters, make_effect<Water>};
 
 }  // namespace qdmd::scene
