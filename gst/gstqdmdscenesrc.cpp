@@ -33,13 +33,13 @@
  */
 #include "gst/gstqdmdscenesrc.h"
 
-#include <cstring>
 #include <exception>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "core/scene/scene.h"
+#include "gst/scenewriter.h"
 #include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_STATIC(qdmd_scene_src_debug);
@@ -48,7 +48,6 @@ GST_DEBUG_CATEGORY_STATIC(qdmd_scene_src_debug);
 namespace {
 
 using qdmd::MappedVideoFrame;
-using qdmd::MutableImageView;
 using namespace qdmd::scene;
 
 #define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
@@ -192,36 +191,6 @@ static bool guarded(GstQdmdSceneSrc* self, Action action) {
   return false;
 }
 
-static void write_picture(const Picture& picture, const MutableImageView& view) {
-  for (int y = 0; y < view.height; ++y) {
-    const uint8_t* from = picture.row(y);
-    const ptrdiff_t row = y * view.row_stride;
-    uint8_t *r = view.channel[0] + row, *g = view.channel[1] + row, *b = view.channel[2] + row;
-    if (view.pixel_stride == 3 && g == r + 1 && b == r + 2) {
-      std::memcpy(r, from, picture.row_bytes());
-      continue;
-    }
-    const ptrdiff_t step = view.pixel_stride;
-    for (int x = 0; x < view.width; ++x)
-      r[x * step] = from[3 * x], g[x * step] = from[3 * x + 1], b[x * step] = from[3 * x + 2];
-    if (uint8_t* alpha = view.alpha ? view.alpha + row : nullptr)
-      for (int x = 0; x < view.width; ++x) alpha[x * step] = 255;
-  }
-}
-
-static void write_mask(const Plane& labels, const MutableImageView& view) {
-  for (int y = 0; y < view.height; ++y) {
-    const uint8_t* from = labels.row(y);
-    const ptrdiff_t row = y * view.row_stride;
-    for (int x = 0; x < view.width; ++x) {
-      const ptrdiff_t at = row + x * view.pixel_stride;
-      const uint8_t level = from[x] == kObjectLabel ? 255 : 0;
-      for (auto* channel : view.channel) channel[at] = level;
-      if (view.alpha) view.alpha[at] = 255;
-    }
-  }
-}
-
 static GstClockTime duration_of(const GstVideoInfo& info, gint64 frames) {
   return gst_util_uint64_scale(guint64(frames), guint64(GST_VIDEO_INFO_FPS_D(&info)) * GST_SECOND,
                                guint64(GST_VIDEO_INFO_FPS_N(&info)));
@@ -253,15 +222,15 @@ static GstFlowReturn gst_qdmd_scene_src_fill(GstPushSrc* source, GstBuffer* buff
       switch (priv->playing.truth) {
         case TRUTH_NONE:
           priv->scene->render(priv->index, kFrame);
-          write_picture(priv->scene->frame(), view);
+          qdmd::write_picture(priv->scene->frame(), view);
           break;
         case TRUTH_BACKGROUND:
           priv->scene->render(priv->index, kTruth);
-          write_picture(priv->scene->background(), view);
+          qdmd::write_picture(priv->scene->background(), view);
           break;
         case TRUTH_MASK:
           priv->scene->render(priv->index, kLabels);
-          write_mask(priv->scene->labels(), view);
+          qdmd::write_mask(priv->scene->labels(), view);
           break;
       }
     });

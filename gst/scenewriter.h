@@ -1,0 +1,43 @@
+// Writes what a scene has made into packed RGB frames of the same size.
+#pragma once
+
+#include <cstring>
+
+#include "core/background/image_view.h"
+#include "core/scene/scene.h"
+
+namespace qdmd {
+
+// Alpha is opaque.
+inline void write_picture(const scene::Picture& picture, const MutableImageView& view) {
+  for (int y = 0; y < view.height; ++y) {
+    const uint8_t* from = picture.row(y);
+    const ptrdiff_t row = y * view.row_stride;
+    uint8_t *r = view.channel[0] + row, *g = view.channel[1] + row, *b = view.channel[2] + row;
+    if (view.pixel_stride == 3 && g == r + 1 && b == r + 2) {
+      std::memcpy(r, from, picture.row_bytes());
+      continue;
+    }
+    const ptrdiff_t step = view.pixel_stride;
+    for (int x = 0; x < view.width; ++x)
+      r[x * step] = from[3 * x], g[x * step] = from[3 * x + 1], b[x * step] = from[3 * x + 2];
+    if (uint8_t* alpha = view.alpha ? view.alpha + row : nullptr)
+      for (int x = 0; x < view.width; ++x) alpha[x * step] = 255;
+  }
+}
+
+// White where the label is that of an object, else black.
+inline void write_mask(const scene::Plane& labels, const MutableImageView& view) {
+  for (int y = 0; y < view.height; ++y) {
+    const uint8_t* from = labels.row(y);
+    const ptrdiff_t row = y * view.row_stride;
+    for (int x = 0; x < view.width; ++x) {
+      const ptrdiff_t at = row + x * view.pixel_stride;
+      const uint8_t level = from[x] == scene::kObjectLabel ? 255 : 0;
+      for (auto* channel : view.channel) channel[at] = level;
+      if (view.alpha) view.alpha[at] = 255;
+    }
+  }
+}
+
+}  // namespace qdmd
