@@ -33,20 +33,18 @@ constexpr size_t kLanes = HWY_LANES(int32_t);
 #if HWY_TARGET == HWY_AVX3_DL
 // Unsigned columns, as they are in the window, times signed rows: level - 128.
 constexpr size_t kStep = 4, kVectors = 3, kCols = 8;
-using RowSample = int8_t;
 using ColSample = uint8_t;
 constexpr int kRowOffset = 128;
 #else
 // Factors of 16 bits.
 constexpr size_t kStep = 2, kVectors = 2, kCols = 4;
-using RowSample = int16_t;
 using ColSample = int16_t;
 constexpr int kRowOffset = 0;
 #endif
 
 // Pixels per block. A sum of 32 bits holds 33025 products of 255 by 255, and 65793 of 255 by -128;
 // the packed rows stay in the second-level cache while the columns stream past.
-constexpr size_t kBlock = 4096 / sizeof(RowSample);
+constexpr size_t kBlock = 1024 * kStep;
 static_assert(kBlock * 255 * 255 < (size_t{1} << 31));
 
 // One step, in one lane.
@@ -56,6 +54,16 @@ HWY_INLINE int32_t step_at(const Sample* samples) {
   int32_t step;
   std::memcpy(&step, samples, sizeof(step));
   return step;
+}
+
+// The pixels of a step of a row, as its samples in one lane.
+HWY_INLINE int32_t row_step(const uint8_t* row) {
+#if HWY_TARGET == HWY_AVX3_DL
+  // Less 128 is the highest bit turned.
+  return static_cast<int32_t>(static_cast<uint32_t>(step_at(row)) ^ 0x80808080u);
+#else
+  return row[0] | row[1] << 16;
+#endif
 }
 
 // The sums of one column with the rows of kCount vectors. Variables, because compilers keep arrays
@@ -95,13 +103,12 @@ struct Sums {
 // packed: for each step, kCount vectors of rows. cols: kCols columns. out: for each column, its
 // sums with the rows.
 template <size_t kCount>
-HWY_NOINLINE void tile(const RowSample* packed, const ColSample* const* cols, size_t steps,
+HWY_NOINLINE void tile(const int32_t* packed, const ColSample* const* cols, size_t steps,
                        int32_t* out) {
   constexpr size_t kRows = kCount * kLanes;
   const D32 d;
   const auto vector = [&](size_t step, size_t index) HWY_ATTR {
-    return hn::LoadU(d, reinterpret_cast<const int32_t*>(packed) + step * kRows +
-                            std::min(index, kCount - 1) * kLanes);
+    return hn::LoadU(d, packed + step * kRows + std::min(index, kCount - 1) * kLanes);
   };
   const ColSample *col0 = cols[0], *col1 = cols[1], *col2 = cols[2], *col3 = cols[3];
   Sums<kCount> s0, s1, s2, s3;
@@ -143,10 +150,7 @@ class Group {
     for (size_t r = 0; r < stride; ++r) {
       // Lanes without a row repeat the first one; nobody takes their sums.
       const uint8_t* row = rows[r < count ? r : 0] + start;
-      for (size_t k = 0; k < steps; ++k)
-        for (size_t i = 0; i < kStep; ++i)
-          packed_[(k * stride + r) * kStep + i] =
-              static_cast<RowSample>(row[k * kStep + i] - kRowOffset);
+      for (size_t k = 0; k < steps; ++k) packed_[k * stride + r] = row_step(row + k * kStep);
     }
   }
 
@@ -194,7 +198,7 @@ class Group {
     return sum;
   }
 
-  alignas(64) RowSample packed_[kVectors * kLanes * kBlock];
+  alignas(64) int32_t packed_[kVectors * kLanes * kBlock / kStep];
   alignas(64) int32_t sums_[kVectors * kLanes * kCols];
   size_t count_ = 0, steps_ = 0, vectors_ = 0;
 };

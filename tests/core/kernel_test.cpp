@@ -89,12 +89,54 @@ TEST_P(KernelExactness, RandomPixels) {
 TEST_P(KernelExactness, ExtremePixels) { expect_exact(extreme_planes(pixels())); }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, KernelExactness,
-                         testing::Values(Size{1, 1}, Size{63, 1}, Size{64, 1}, Size{65, 1},
+                         testing::Values(Size{1, 1}, Size{3, 1}, Size{63, 1}, Size{64, 1},
+                                         Size{65, 1}, Size{255, 1}, Size{2049, 1}, Size{4095, 1},
+                                         Size{4097, 1}, Size{65793, 1}, Size{65794, 1},
                                          Size{320, 240}, Size{1920, 1080}),
                          [](const testing::TestParamInfo<Size>& size) {
                            return std::to_string(size.param.width) + "x" +
                                   std::to_string(size.param.height);
                          });
+
+// Tiles that are not full, in rows, in columns and in pixels, at any alignment.
+TEST(Kernels, AnyNumberOfRowsAndColumns) {
+  std::mt19937 rng(72);
+  constexpr size_t kMost = 101;
+  const Planes planes = random_planes(kMost, 5000, rng);
+  const Kernel& reference = kernels().back();
+  for (const size_t row_count : {1, 2, 3, 15, 16, 17, 32, 33, 48, 49, 101})
+    for (const size_t col_count : {1, 3, 4, 5, 7, 8, 9, 96, 101})
+      for (const size_t length : {1, 2, 5, 257, 4099}) {
+        std::vector<const uint8_t*> rows, cols;
+        for (size_t i = 0; i < row_count; ++i) rows.push_back(planes[kMost - 1 - i].data() + i % 5);
+        for (size_t j = 0; j < col_count; ++j) cols.push_back(planes[j].data() + j % 3);
+        std::vector<int64_t> expected(row_count * col_count), out(row_count * col_count);
+        reference.dot_products(rows.data(), row_count, cols.data(), col_count, length,
+                               expected.data());
+        for (const Kernel& kernel : kernels()) {
+          std::fill(out.begin(), out.end(), -1);
+          kernel.dot_products(rows.data(), row_count, cols.data(), col_count, length, out.data());
+          ASSERT_EQ(out, expected) << kernel.name << ", " << row_count << " x " << col_count << ", "
+                                   << length << " pixels";
+        }
+      }
+}
+
+// Zeros and the largest levels, where 32 bits are narrowest.
+TEST(Kernels, AllBlackAndAllWhite) {
+  for (const int level : {0, 255})
+    for (const size_t length : {4096, 65793, 1 << 20}) {
+      const Planes planes(9, std::vector<uint8_t>(length, static_cast<uint8_t>(level)));
+      std::vector<const uint8_t*> pointers;
+      for (const auto& plane : planes) pointers.push_back(plane.data());
+      const std::vector<int64_t> expected(81, static_cast<int64_t>(length) * level * level);
+      for (const Kernel& kernel : kernels()) {
+        std::vector<int64_t> out(81, -1);
+        kernel.dot_products(pointers.data(), 9, pointers.data(), 9, length, out.data());
+        EXPECT_EQ(out, expected) << kernel.name;
+      }
+    }
+}
 
 TEST(Kernels, TheDefaultIsTheFirst) {
   ASSERT_FALSE(kernels().empty());
