@@ -369,6 +369,9 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
   const BufferPtr buffer(trans->queued_buf);
   trans->queued_buf = nullptr;
   if (!buffer) return GST_FLOW_OK;
+  // The base class asks for frames until there is none, or until downstream refuses one (it has
+  // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
+  if (priv->engine.ready()) drop_frames(self);
 
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(

@@ -1,12 +1,23 @@
 // Writes what a scene has made into packed RGB frames of the same size.
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/background/image_view.h"
 #include "core/scene/scene.h"
 
 namespace qdmd {
+
+// GStreamer rounds rows of three bytes a pixel up to four: the bytes behind a row become zero, so
+// that equal pictures are equal files.
+inline void clear_padding(const MutableImageView& view) {
+  const ptrdiff_t used = view.width * view.pixel_stride;
+  if (view.row_stride - used >= 4 || view.pixel_stride != 3) return;
+  uint8_t* first = std::min({view.channel[0], view.channel[1], view.channel[2]});
+  for (int y = 0; y < view.height; ++y)
+    std::memset(first + y * view.row_stride + used, 0, static_cast<size_t>(view.row_stride - used));
+}
 
 // Alpha is opaque.
 inline void write_picture(const scene::Picture& picture, const MutableImageView& view) {
@@ -24,6 +35,7 @@ inline void write_picture(const scene::Picture& picture, const MutableImageView&
     if (uint8_t* alpha = view.alpha ? view.alpha + row : nullptr)
       for (int x = 0; x < view.width; ++x) alpha[x * step] = 255;
   }
+  clear_padding(view);
 }
 
 // White where the label is that of an object, else black.
@@ -38,6 +50,7 @@ inline void write_mask(const scene::Plane& labels, const MutableImageView& view)
       if (view.alpha) view.alpha[at] = 255;
     }
   }
+  clear_padding(view);
 }
 
 }  // namespace qdmd

@@ -57,10 +57,11 @@ int person_height(int frame_width, int wanted);
 inline constexpr double kBeyond = 0.05;
 
 // The mover of the default scene: persons cross the frame, one after the other, in turn from the
-// left and from the right. Crossing takes kCrossing seconds, and `pause` more in the middle.
+// left and from the right. Crossing takes kCrossing seconds, and `pause` more in the middle: no
+// whole number, so that a camera that takes a frame every few seconds does not always see the same.
 class Crossing : public Actor {
  public:
-  static constexpr double kCrossing = 5;
+  static constexpr double kCrossing = 4.7;
 
   Crossing(int width, int height, double pause, const StreamSource& streams, const Dress& dress);
   void place(double time, std::vector<Placement>* placements) const override;

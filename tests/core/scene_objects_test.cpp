@@ -20,16 +20,17 @@ TEST(SceneStop, StandsExactlyAsLongAsAsked) {
   for (const double seconds : {0.0, 1.0, 8.0}) {
     constexpr int kRate = 25;
     Scene scene(options(320, 240, kRate), "stop=" + std::to_string(seconds));
-    // Crossing takes 5 s: the mover stands from 2.5 s on. It goes 3 pixels a frame otherwise.
+    // It goes 4 pixels a frame but for the time that it stands.
+    constexpr double kHalf = scene::Crossing::kCrossing / 2;
     int standing = 0;
-    const auto middle = static_cast<int64_t>(std::ceil((2.5 + seconds / 2) * kRate));
+    const auto middle = static_cast<int64_t>(std::ceil((kHalf + seconds / 2) * kRate));
     const Shot there = shoot(&scene, middle);
     ASSERT_EQ(there.boxes.size(), 1u);
-    const auto last = static_cast<int64_t>((5 + seconds) * kRate);
+    const auto last = static_cast<int64_t>((2 * kHalf + seconds) * kRate);
     for (int64_t k = 0; k < last; ++k) {
       const Shot shot = shoot(&scene, k);
       const double time = static_cast<double>(k) / kRate;
-      const bool same = shot == there, stands = time >= 2.5 && time <= 2.5 + seconds;
+      const bool same = shot == there, stands = time >= kHalf && time <= kHalf + seconds;
       standing += same;
       EXPECT_EQ(same, stands || (seconds == 0 && k == middle)) << seconds << " s, frame " << k;
     }

@@ -53,7 +53,12 @@ class Subtractor : public Method {
     }
     subtractor->getBackgroundImage(result.background);
     result.seconds = watch.seconds();
-    if (result.background.empty()) throw std::runtime_error(name() + " gave no background");
+    // KNN's is empty or black before it has seen enough.
+    const auto is_black = [](const cv::Mat& picture) {
+      return picture.empty() || cv::countNonZero(picture.reshape(1)) == 0;
+    };
+    if (is_black(result.background) && !is_black(task.frames.back()))
+      throw std::runtime_error("it has learnt no background from so few frames");
     return result;
   }
 

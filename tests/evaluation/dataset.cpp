@@ -20,13 +20,43 @@ bool is_picture(const fs::path& path) {
   return kinds.contains(kind) && path.filename().string().front() != '.';
 }
 
-// Sorted by name; empty where there is no such folder.
-std::vector<fs::path> pictures_in(const fs::path& folder) {
+// By name, numbers in it by their value: 2.png comes before 10.png.
+bool in_name_order(const fs::path& a, const fs::path& b) {
+  const std::string x = a.filename().string(), y = b.filename().string();
+  const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
+  size_t i = 0, k = 0;
+  while (i < x.size() && k < y.size()) {
+    if (!is_digit(x[i]) || !is_digit(y[k])) {
+      if (x[i] != y[k]) return x[i] < y[k];
+      ++i, ++k;
+      continue;
+    }
+    // Without leading zeros the longer number is larger.
+    while (i < x.size() && x[i] == '0') ++i;
+    while (k < y.size() && y[k] == '0') ++k;
+    size_t end_i = i, end_k = k;
+    while (end_i < x.size() && is_digit(x[end_i])) ++end_i;
+    while (end_k < y.size() && is_digit(y[end_k])) ++end_k;
+    if (end_i - i != end_k - k) return end_i - i < end_k - k;
+    const int order = x.compare(i, end_i - i, y, k, end_k - k);
+    if (order != 0) return order < 0;
+    i = end_i, k = end_k;
+  }
+  return x.size() - i != y.size() - k ? x.size() - i < y.size() - k : x < y;
+}
+
+// In name order; empty where there is no such folder. Where it cannot be read, says so in
+// `problems`.
+std::vector<fs::path> pictures_in(const fs::path& folder, std::vector<std::string>* problems) {
   std::vector<fs::path> found;
-  if (!fs::is_directory(folder)) return found;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (is_picture(entry.path()) && !entry.is_directory()) found.push_back(entry.path());
-  std::sort(found.begin(), found.end());
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return found;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_picture(entry->path()) && !entry->is_directory(error)) found.push_back(entry->path());
+  if (error)
+    problems->push_back(folder.filename().string() + "/ cannot be read: " + error.message());
+  std::sort(found.begin(), found.end(), in_name_order);
   return found;
 }
 
@@ -45,8 +75,9 @@ int truth_order(const fs::path& path) {
 }
 
 bool is_sequence(const fs::path& folder) {
+  std::error_code error;
   for (const char* part : {"input", "gt", "GT", "groundtruth"})
-    if (fs::is_directory(folder / part)) return true;
+    if (fs::is_directory(folder / part, error)) return true;
   return false;
 }
 
@@ -54,17 +85,17 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
   Sequence sequence;
   sequence.name = name;
   sequence.folder = folder;
-  sequence.frames = pictures_in(folder / "input");
+  sequence.frames = pictures_in(folder / "input", &sequence.problems);
   std::vector<fs::path> truths;
   for (const char* part : {"gt", "GT", "groundtruth"})
-    for (const auto& file : pictures_in(folder / part)) {
+    for (const auto& file : pictures_in(folder / part, &sequence.problems)) {
       uint64_t number = 0;
-      if (is_mask_name(file) && frame_number(file, &number))
+      if (part == std::string("groundtruth") && is_mask_name(file) && frame_number(file, &number))
         sequence.masks[number] = file;
       else
         truths.push_back(file);
     }
-  for (const auto& file : pictures_in(folder / "gt" / "masks")) {
+  for (const auto& file : pictures_in(folder / "gt" / "masks", &sequence.problems)) {
     uint64_t number = 0;
     if (frame_number(file, &number)) sequence.masks[number] = file;
   }
@@ -90,14 +121,24 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
 // Sequences in the folders of `folder`; where one of those is none, in its folders.
 void collect(const fs::path& folder, const std::string& prefix, int levels,
              std::vector<Sequence>* sequences) {
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (!entry.is_directory() || name.front() == '.') continue;
-    if (is_sequence(entry.path()))
-      sequences->push_back(read_sequence(entry.path(), prefix + name));
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const fs::path path = entry->path();
+    const std::string name = path.filename().string();
+    std::error_code unknown;
+    if (!entry->is_directory(unknown) || name.front() == '.') continue;
+    if (is_sequence(path))
+      sequences->push_back(read_sequence(path, prefix + name));
     else if (levels > 1)
-      collect(entry.path(), prefix + name + "/", levels - 1, sequences);
+      collect(path, prefix + name + "/", levels - 1, sequences);
   }
+  if (!error) return;
+  Sequence unreadable;
+  unreadable.name = prefix.empty() ? folder.filename().string() : prefix;
+  unreadable.folder = folder;
+  unreadable.problems.push_back("the folder cannot be read: " + error.message());
+  sequences->push_back(std::move(unreadable));
 }
 
 }  // namespace

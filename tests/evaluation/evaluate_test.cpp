@@ -331,5 +331,24 @@ TEST(Element, PropertiesChangeThePicture) {
   EXPECT_EQ(errors.size(), 3u);
 }
 
+// Numbers in names count by their value, with and without leading zeros.
+TEST(Evaluate, TenComesAfterTwo) {
+  const Folder data;
+  for (int t = 1; t <= 12; ++t) {
+    write(data / "plain/input" / (std::to_string(t) + ".png"), frame_at(t));
+    char name[16];
+    std::snprintf(name, sizeof name, "%03d.png", t);
+    write(data / "padded/input" / name, frame_at(t));
+  }
+  for (const char* sequence : {"plain", "padded"})
+    write(data / sequence / "gt/GT_x.png", still_picture());
+  const Result result = evaluate(
+      {"--dataset", data.string(), "--methods", "mean,mog2", "--frames", "4", "--format", "json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const auto table = result.json();
+  for (const char* method : {"mean", "mog2"})
+    EXPECT_EQ(row_of(table, "plain", method).at("AGE"), row_of(table, "padded", method).at("AGE"));
+}
+
 }  // namespace
 }  // namespace qdmd::test

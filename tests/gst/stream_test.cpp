@@ -28,6 +28,31 @@ TEST_P(FrameCount, AllComeOutInOrderWithTheirTimestamps) {
 
 INSTANTIATE_TEST_SUITE_P(AroundTheWindow, FrameCount, testing::Values(1, 2, 7, 19, 20, 21, 47, 60));
 
+// A sink that has seen enough, or that is not there, is no error of ours, whoever feeds us.
+TEST(Downstream, MayEndInTheMiddleOfAWindow) {
+  for (const char* launch :
+       {"videotestsrc num-buffers=150 ! queue ! qdmdbackground window-size=20 ! "
+        "fakesink num-buffers=25",
+        "videotestsrc num-buffers=150 ! tee name=t t. ! queue ! qdmdbackground window-size=20 ! "
+        "identity eos-after=7 ! fakesink t. ! queue ! fakesink",
+        "videotestsrc num-buffers=60 ! tee name=t t. ! qdmdbackground window-size=5 "
+        "t. ! queue ! fakesink"}) {
+    SCOPED_TRACE(launch);
+    GstElement* pipeline = gst_parse_launch(launch, nullptr);
+    ASSERT_TRUE(pipeline);
+    gst_element_set_state(pipeline, GST_STATE_PLAYING);
+    GstBus* bus = gst_element_get_bus(pipeline);
+    GstMessage* message = gst_bus_timed_pop_filtered(
+        bus, 30 * GST_SECOND, GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    ASSERT_TRUE(message) << "it did not end";
+    EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(message));
+    gst_message_unref(message);
+    gst_element_set_state(pipeline, GST_STATE_NULL);
+    gst_object_unref(bus);
+    gst_object_unref(pipeline);
+  }
+}
+
 TEST(Content, EachOutputBelongsToItsOwnFrame) {
   // With the background removed, what stays of each frame is its own square.
   for (int count : {20, 33}) {
