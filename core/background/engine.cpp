@@ -12,7 +12,8 @@ namespace qdmd {
 namespace {
 
 // Frames that enter the Gram matrix together: few enough that little is left to do when a window is
-// full, enough that the window is not read from memory for every frame.
+// full, enough that they fill a register tile and the window is not read from memory for each of
+// them.
 constexpr int kGramGroup = 16;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {

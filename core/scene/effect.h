@@ -41,7 +41,6 @@ struct Light {
   void scale(double factor) {
     for (auto& value : gain) value *= factor;
   }
-  double mean_gain() const { return (gain[0] + gain[1] + gain[2]) / 3; }
 };
 
 // What is asked for. Nothing else is computed.

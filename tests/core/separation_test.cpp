@@ -109,7 +109,8 @@ TEST_P(Separation, NoiseIsAveragedOut) {
   }
 }
 
-// L(t) varies in time: no one picture is nearer than a quarter of the change to both ends.
+// L(t) varies in time: any one picture for the whole window is wrong by half of the change at one
+// end of it, some 25 levels.
 TEST_P(Separation, AFadeIsFollowed) {
   for (const int kept : {0, 1}) {
     const Score fading = separate("fade=0.4:duration=4,noise=2", rank(kept), GetParam());

@@ -2,26 +2,13 @@
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
 #include "core/quaternion/schur.h"
+#include "tests/core/solver_names.h"
 #include "tests/core/test_util.h"
 
 namespace qdmd::test {
 namespace {
 
 constexpr Solver kSolvers[] = {Solver::gram, Solver::gram_extended, Solver::qr, Solver::adjoint};
-
-const char* name_of(Solver solver) {
-  switch (solver) {
-    case Solver::gram:
-      return "gram";
-    case Solver::gram_extended:
-      return "gram-extended";
-    case Solver::qr:
-      return "qr";
-    case Solver::adjoint:
-      return "adjoint";
-  }
-  return "";
-}
 
 BackgroundModes solve(const Clip& clip, Solver solver, DmdOptions options) {
   options.solver = solver;

@@ -82,20 +82,6 @@ Precision precision(Solver solver, double pixels, double frames, double conditio
 
 }  // namespace
 
-const char* name(Solver solver) {
-  switch (solver) {
-    case Solver::gram:
-      return "gram";
-    case Solver::gram_extended:
-      return "gram-extended";
-    case Solver::qr:
-      return "qr";
-    case Solver::adjoint:
-      break;
-  }
-  return "adjoint";
-}
-
 Assessment assess(const HardCase& hard_case, Amplitude amplitude) {
   const Window window = hard_case.make();
   const IntegerMatrix gram = gram_of(window);

@@ -38,6 +38,4 @@ struct Assessment {
 // All solvers that can run on the case, at full rank, nearest mode.
 Assessment assess(const HardCase& hard_case, Amplitude amplitude);
 
-const char* name(Solver solver);
-
 }  // namespace qdmd::stability
