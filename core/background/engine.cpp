@@ -79,7 +79,9 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   // The old window goes first: two at once would break the promise of max-memory.
   window_ = Window();
   window_ = Window(options.window_size, pixels);
-  gram_ = SlidingGram(options.window_size, thread_count(options));
+  gram_ = SlidingGram();
+  pool_ = std::make_unique<Pool>(thread_count(options));
+  gram_ = SlidingGram(options.window_size, pool_.get());
   alpha_ = AlphaStore(options.window_size);
   report_ = SolveReport();
   solves_ = 0;

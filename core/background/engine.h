@@ -1,6 +1,7 @@
 // The background separator: frames in, pictures out, a window at a time. No GStreamer.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "core/background/alpha_store.h"
@@ -8,6 +9,7 @@
 #include "core/background/foreground.h"
 #include "core/dmd/options.h"
 #include "core/gram/gram.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
@@ -79,6 +81,8 @@ class Engine {
 
   EngineOptions options_;
   int width_ = 0, height_ = 0;
+  // Shared by all passes over pixels; made by configure().
+  std::unique_ptr<Pool> pool_;
   Window window_;
   SlidingGram gram_;
   AlphaStore alpha_;

@@ -1,47 +1,128 @@
 #include "core/gram/gram.h"
 
-#include <vector>
-
-#include "core/gram/parallel.h"
+#include <algorithm>
+#include <functional>
 
 namespace qdmd {
+namespace {
 
-SlidingGram::SlidingGram(int capacity, int threads, const Kernel& kernel)
+// Snapshots that are rows of one product: their planes fill the kernels' register tiles, and the
+// sums stay small for any number of snapshots added at once.
+constexpr int kRowSnapshots = 16;
+
+// Parts start at multiples of a cache line, as planes do.
+constexpr size_t kUnit = 64;
+
+// Waking a thread costs as much as some million products.
+constexpr uint64_t kProductsPerPart = 4'000'000;
+
+// Pixels that amortise the sums of a part, and parts per thread: where another program takes a core
+// for a while, the other threads do more of them.
+constexpr size_t kPixelsPerPart = 16384;
+constexpr size_t kPartsPerThread = 8;
+
+size_t part_count(size_t threads, uint64_t pairs, size_t length) {
+  if (threads == 1) return 1;
+  const uint64_t by_pixels =
+      std::clamp<uint64_t>(length / kPixelsPerPart, threads, threads * kPartsPerThread);
+  // Below 2^62: at most 6144 rows and columns of 2^36 pixels.
+  const uint64_t most = std::min<uint64_t>(length / kUnit, pairs * length / kProductsPerPart);
+  return static_cast<size_t>(std::clamp<uint64_t>(most, 1, by_pixels));
+}
+
+}  // namespace
+
+SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
     : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)),
-      threads_(threads),
-      kernel_(kernel) {}
+      pool_(pool),
+      kernel_(kernel),
+      has_sums_(pool ? pool->threads() : 1) {
+  const auto cols = static_cast<size_t>(kChannels * capacity);
+  planes_.reserve(cols);
+  sums_size_ = static_cast<size_t>(kChannels * std::min(kRowSnapshots, capacity)) * cols;
+  // Without touching it.
+  sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * has_sums_.size());
+}
 
 void SlidingGram::add_newest(const Window& window, int count, int span) {
-  const int size = window.size();
-  if (span == 0) span = size;
-  std::vector<const uint8_t*> planes;
-  planes.reserve(static_cast<size_t>(span) * kChannels);
-  for (int t = size - span; t < size; ++t)
-    for (int c = 0; c < kChannels; ++c) planes.push_back(window.plane(window.slot(t), c));
-  Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> products(
-      kChannels * count, kChannels * span);
-  const auto rows = static_cast<size_t>(kChannels * count);
-  parallel_dot_products(kernel_, threads_, planes.data() + planes.size() - rows, rows,
-                        planes.data(), planes.size(), window.plane_size(), products.data());
-  for (int k = 0; k < count; ++k) {
-    const int added = window.slot(size - count + k);
-    for (int t = 0; t < span; ++t) {
-      const int slot = window.slot(size - span + t);
-      const auto block = products.block<kChannels, kChannels>(kChannels * k, kChannels * t);
-      by_slot_.block<kChannels, kChannels>(kChannels * added, kChannels * slot) = block;
-      by_slot_.block<kChannels, kChannels>(kChannels * slot, kChannels * added) = block.transpose();
-    }
+  if (span == 0) span = window.size();
+  add_slice(window, {window.size(), count, span}, 0, window.plane_size());
+}
+
+void SlidingGram::add_slice(const Window& window, const SnapshotGroup& group, size_t first,
+                            size_t length) {
+  planes_.clear();
+  for (int t = group.end - group.span; t < group.end; ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(window.plane(window.slot(t), c));
+  // Each snapshot needs those up to itself only: what comes after is the mirror image.
+  const int start = group.end - group.count;
+  for (int t = start; t < group.end; t += kRowSnapshots) {
+    const int end = std::min(t + kRowSnapshots, group.end);
+    const SnapshotGroup rows = {end, end - t, end - (group.end - group.span)};
+    multiply(rows, first, length);
+    store(window, rows, first == 0);
   }
+}
+
+// Leaves the sums of the threads that took part.
+void SlidingGram::multiply(const SnapshotGroup& rows, size_t first, size_t length) {
+  const auto row_count = static_cast<size_t>(kChannels * rows.count);
+  const auto col_count = static_cast<size_t>(kChannels * rows.span);
+  const auto add = [&](size_t start, size_t end, size_t thread) {
+    int64_t* sums = sums_.get() + thread * sums_size_;
+    if (!has_sums_[thread]) std::fill_n(sums, row_count * col_count, int64_t{0});
+    has_sums_[thread] = true;
+    kernel_.add_dot_products(planes_.data() + col_count - row_count, row_count, planes_.data(),
+                             col_count, start, end - start, sums);
+  };
+  std::fill(has_sums_.begin(), has_sums_.end(), uint8_t{0});
+  const size_t parts = part_count(has_sums_.size(), uint64_t{row_count} * col_count, length);
+  if (parts == 1) {
+    add(first, first + length, 0);
+    return;
+  }
+  const auto boundary = [&](size_t part) {
+    if (part == 0) return first;
+    if (part == parts) return first + length;
+    return (first + length / kUnit * part / parts * kUnit) / kUnit * kUnit;
+  };
+  pool_->run(parts,
+             [&](size_t part, size_t thread) { add(boundary(part), boundary(part + 1), thread); });
+}
+
+void SlidingGram::store(const Window& window, const SnapshotGroup& rows, bool fresh) {
+  const Eigen::Index col_count = kChannels * rows.span;
+  for (int k = 0; k < rows.count; ++k)
+    for (int c = 0; c < kChannels; ++c) {
+      auto column = by_slot_.col(kChannels * window.slot(rows.end - rows.count + k) + c);
+      bool overwrite = fresh;
+      for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
+        if (!has_sums_[thread]) continue;
+        const int64_t* sums = sums_.get() + thread * sums_size_ + (kChannels * k + c) * col_count;
+        for (int t = 0; t < rows.span; ++t, sums += kChannels) {
+          auto products =
+              column.segment<kChannels>(kChannels * window.slot(rows.end - rows.span + t));
+          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(sums);
+          if (overwrite)
+            products = sum;
+          else
+            products += sum;
+        }
+        overwrite = false;
+      }
+    }
 }
 
 IntegerMatrix SlidingGram::matrix(const Window& window) const {
   const int size = window.size();
   IntegerMatrix gram(kChannels * size, kChannels * size);
   for (int t = 0; t < size; ++t)
-    for (int s = 0; s < size; ++s)
-      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) =
-          by_slot_.block<kChannels, kChannels>(kChannels * window.slot(s),
-                                               kChannels * window.slot(t));
+    for (int s = 0; s <= t; ++s) {
+      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * window.slot(s),
+                                                              kChannels * window.slot(t));
+      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block;
+      gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block.transpose();
+    }
   return gram;
 }
 

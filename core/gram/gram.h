@@ -2,9 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
+#include <vector>
 
 #include "core/gram/kernel.h"
 #include "core/gram/window.h"
+#include "core/parallel/pool.h"
 #include "core/quaternion/matrix.h"
 
 namespace qdmd {
@@ -12,26 +15,51 @@ namespace qdmd {
 // 3m x 3m inner products of the window's planes; row 3 t + c is channel c of snapshot t.
 using IntegerMatrix = Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic>;
 
+// Snapshots that enter the Gram matrix together, by their place in time: [end - count, end) of the
+// window, each with those of [end - span, end). count <= span <= end <= window.size().
+struct SnapshotGroup {
+  int end, count, span;
+};
+
 // Keeps the Gram matrix of a ring of snapshots. Integers only: adding and dropping snapshots for
-// ever gives the same bits as computing afresh.
+// ever gives the same bits as computing afresh. Not thread safe.
 class SlidingGram {
  public:
   SlidingGram() = default;
-  // Up to `threads` (at least 1) threads compute; their number does not change the bits.
-  explicit SlidingGram(int capacity, int threads = 1, const Kernel& kernel = kernels().front());
+  // The threads of `pool` (null: the caller's alone) compute; their number does not change the
+  // bits. The pool outlives this. All memory is taken here: throws std::bad_alloc.
+  explicit SlidingGram(int capacity, Pool* pool = nullptr,
+                       const Kernel& kernel = kernels().front());
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
-  // (count <= span; 0: all), 9 span products per pixel and snapshot. Several at once read the
-  // window from memory once. Elements of matrix() are valid for pairs that met in such a call.
+  // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read
+  // the window from memory once. Elements of matrix() are valid for pairs that met in such a call.
   void add_newest(const Window& window, int count = 1, int span = 0);
+
+  // The part of such a call that pixels [first, first + length) of the planes contribute, of
+  // plane_size() pixels at most. The slice that begins at pixel 0 comes first and forgets the
+  // group's old products; the others follow in any order and size. The group's elements of matrix()
+  // are valid once its slices have covered every pixel once.
+  // Between slices, frames may be appended: the caller then lowers `end` by each that was dropped
+  // from a full window, and `span` by each dropped one that was part of it.
+  void add_slice(const Window& window, const SnapshotGroup& group, size_t first, size_t length);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const Window& window) const;
 
  private:
+  void multiply(const SnapshotGroup& rows, size_t first, size_t length);
+  void store(const Window& window, const SnapshotGroup& rows, bool fresh);
+
+  // Column 3 s + c has the products of slot s's channel c with the planes of its time and before.
   IntegerMatrix by_slot_;
-  int threads_ = 1;
+  Pool* pool_ = nullptr;
   Kernel kernel_ = kernels().front();
+  std::vector<const uint8_t*> planes_;  // of a call's span, in time order
+  // For each thread, its sums of a call: rows x columns. Not touched by threads that do nothing.
+  std::unique_ptr<int64_t[]> sums_;
+  std::vector<uint8_t> has_sums_;  // whether a thread took part
+  size_t sums_size_ = 0;           // of one thread
 };
 
 // G_st = x_s^H x_t, m x m, from the identity conj(x) y = x . y - x cross y for pure quaternions.

@@ -33,11 +33,10 @@ void block_dots(const std::array<WideRow, kRows>& rows, const uint8_t* col, size
 }
 
 void widened(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-             size_t col_count, size_t length, int64_t* out) noexcept {
-  std::fill(out, out + row_count * col_count, int64_t{0});
+             size_t col_count, size_t first, size_t length, int64_t* out) noexcept {
   std::array<WideRow, kRows> wide{};
-  for (size_t start = 0; start < length; start += kBlock) {
-    const size_t count = std::min(kBlock, length - start);
+  for (size_t done = 0; done < length; done += kBlock) {
+    const size_t start = first + done, count = std::min(kBlock, length - done);
     for (size_t i = 0; i < row_count; i += kRows) {
       // A group that is not full repeats old rows; their sums are not taken.
       const size_t group = std::min(kRows, row_count - i);
@@ -53,12 +52,12 @@ void widened(const uint8_t* const* rows, size_t row_count, const uint8_t* const*
 
 // The definition, without blocks: what the other kernels are compared with.
 void reference(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-               size_t col_count, size_t length, int64_t* out) noexcept {
+               size_t col_count, size_t first, size_t length, int64_t* out) noexcept {
   for (size_t i = 0; i < row_count; ++i)
     for (size_t j = 0; j < col_count; ++j) {
       int64_t sum = 0;
-      for (size_t p = 0; p < length; ++p) sum += int64_t{rows[i][p]} * cols[j][p];
-      out[i * col_count + j] = sum;
+      for (size_t p = first; p < first + length; ++p) sum += int64_t{rows[i][p]} * cols[j][p];
+      out[i * col_count + j] += sum;
     }
 }
 
@@ -72,11 +71,6 @@ std::span<const Kernel> kernels() {
     return all;
   }();
   return kKernels;
-}
-
-void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                  size_t col_count, size_t length, int64_t* out) noexcept {
-  kernels().front().dot_products(rows, row_count, cols, col_count, length, out);
 }
 
 }  // namespace qdmd

@@ -10,18 +10,14 @@ namespace qdmd {
 // One way to compute inner products. All give the same bits.
 struct Kernel {
   const char* name;
-  // out[i * col_count + j] = sum over p < length of rows[i][p] * cols[j][p], exactly.
-  // `length` may be anything up to 2^46; the sums are integers below 2^63. Threads run it, so it
-  // neither throws nor keeps anything between calls.
-  void (*dot_products)(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                       size_t col_count, size_t length, int64_t* out) noexcept;
+  // out[i * col_count + j] += sum over first <= p < first + length of rows[i][p] * cols[j][p],
+  // exactly. `length` may be anything up to 2^46, so that the sums are integers below 2^63.
+  // Threads run it: it neither throws nor keeps anything between calls.
+  void (*add_dot_products)(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+                           size_t col_count, size_t first, size_t length, int64_t* out) noexcept;
 };
 
 // Every kernel that this machine can run, the fastest first.
 std::span<const Kernel> kernels();
-
-// Kernel::dot_products of the fastest kernel.
-void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                  size_t col_count, size_t length, int64_t* out) noexcept;
 
 }  // namespace qdmd

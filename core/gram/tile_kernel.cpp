@@ -205,20 +205,19 @@ class Group {
 
 }  // namespace
 
-void dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
-                  size_t col_count, size_t length, int64_t* out) noexcept {
+void add_dot_products(const uint8_t* const* rows, size_t row_count, const uint8_t* const* cols,
+                      size_t col_count, size_t first, size_t length, int64_t* out) noexcept {
   constexpr size_t kGroup = kVectors * kLanes;
-  std::fill(out, out + row_count * col_count, int64_t{0});
   // Some 200 KiB of stack: there is no allocation that could fail.
   Group group;
   const size_t whole = length / kStep * kStep;
-  for (size_t start = 0; start < whole; start += kBlock)
+  for (size_t done = 0; done < whole; done += kBlock)
     for (size_t i = 0; i < row_count; i += kGroup) {
-      group.pack(rows + i, std::min(kGroup, row_count - i), start,
-                 std::min(kBlock, whole - start) / kStep);
-      group.multiply(cols, col_count, start, out + i * col_count);
+      group.pack(rows + i, std::min(kGroup, row_count - i), first + done,
+                 std::min(kBlock, whole - done) / kStep);
+      group.multiply(cols, col_count, first + done, out + i * col_count);
     }
-  for (size_t p = whole; p < length; ++p)
+  for (size_t p = first + whole; p < first + length; ++p)
     for (size_t i = 0; i < row_count; ++i)
       for (size_t j = 0; j < col_count; ++j) out[i * col_count + j] += rows[i][p] * cols[j][p];
 }
@@ -238,13 +237,13 @@ std::vector<Kernel> tile_kernels() {
   };
   static constexpr Compiled kCompiled[] = {
 #if HWY_TARGETS & HWY_AVX3_DL
-    {HWY_AVX3_DL, {"avx512-vnni", N_AVX3_DL::dot_products}},
+    {HWY_AVX3_DL, {"avx512-vnni", N_AVX3_DL::add_dot_products}},
 #endif
 #if HWY_TARGETS & HWY_AVX2
-    {HWY_AVX2, {"avx2", N_AVX2::dot_products}},
+    {HWY_AVX2, {"avx2", N_AVX2::add_dot_products}},
 #endif
 #if HWY_TARGETS & HWY_NEON
-    {HWY_NEON, {"neon", N_NEON::dot_products}},
+    {HWY_NEON, {"neon", N_NEON::add_dot_products}},
 #endif
     {0, {"none", nullptr}},
   };

@@ -78,7 +78,8 @@ void window_gram(benchmark::State& state, const Kernel& kernel) {
   const auto pixels = static_cast<size_t>(state.range(1)) * static_cast<size_t>(state.range(2));
   const Window full = random_window(frames, pixels);
   Window window(frames, pixels);
-  SlidingGram gram(frames, threads, kernel);
+  Pool pool(threads);
+  SlidingGram gram(frames, &pool, kernel);
   for (auto _ : state) {
     window.clear();
     for (int t = 0; t < frames; ++t) {

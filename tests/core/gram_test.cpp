@@ -23,13 +23,13 @@ void expect_exact(const Planes& rows, const Planes& cols, size_t length) {
   for (const auto& row : rows) row_pointers.push_back(row.data());
   for (const auto& col : cols) col_pointers.push_back(col.data());
   for (const Kernel& kernel : kernels()) {
-    // Rubbish in `out` has to be overwritten, and nothing behind it touched.
+    // Sums are added to what `out` holds, and nothing behind it is touched.
     std::vector<int64_t> out(rows.size() * cols.size() + 1, -12345);
-    kernel.dot_products(row_pointers.data(), rows.size(), col_pointers.data(), cols.size(), length,
-                        out.data());
+    kernel.add_dot_products(row_pointers.data(), rows.size(), col_pointers.data(), cols.size(), 0,
+                            length, out.data());
     for (size_t i = 0; i < rows.size(); ++i)
       for (size_t j = 0; j < cols.size(); ++j)
-        EXPECT_EQ(out[i * cols.size() + j], naive_dot(rows[i], cols[j]))
+        EXPECT_EQ(out[i * cols.size() + j] + 12345, naive_dot(rows[i], cols[j]))
             << kernel.name << " length " << length << " row " << i << " col " << j;
     EXPECT_EQ(out.back(), -12345) << kernel.name;
   }
@@ -67,7 +67,7 @@ TEST(DotProducts, SumsBeyond32Bits) {
   const uint8_t* pointer = white.data();
   for (const Kernel& kernel : kernels()) {
     int64_t out = 0;
-    kernel.dot_products(&pointer, 1, &pointer, 1, white.size(), &out);
+    kernel.add_dot_products(&pointer, 1, &pointer, 1, 0, white.size(), &out);
     EXPECT_EQ(out, int64_t{255} * 255 * 70000) << kernel.name;
     EXPECT_GT(out, int64_t{UINT32_MAX}) << kernel.name;
   }
@@ -97,7 +97,7 @@ TEST(DotProducts, UnalignedPlanes) {
     const uint8_t* col = y.data() + 63 - offset;
     for (const Kernel& kernel : kernels()) {
       int64_t out = 0;
-      kernel.dot_products(&row, 1, &col, 1, 300, &out);
+      kernel.add_dot_products(&row, 1, &col, 1, 0, 300, &out);
       EXPECT_EQ(out, naive_dot({row, row + 300}, {col, col + 300})) << kernel.name;
     }
   }

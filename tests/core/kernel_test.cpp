@@ -70,9 +70,9 @@ class KernelExactness : public testing::TestWithParam<Size> {
       for (size_t j = i; j < count; ++j)
         expected[i * count + j] = expected[j * count + i] = exact_dot(planes[i], planes[j]);
     for (const Kernel& kernel : kernels()) {
-      std::vector<int64_t> out(count * count, -1);
-      kernel.dot_products(pointers.data(), count, pointers.data(), count, planes[0].size(),
-                          out.data());
+      std::vector<int64_t> out(count * count);
+      kernel.add_dot_products(pointers.data(), count, pointers.data(), count, 0, planes[0].size(),
+                              out.data());
       for (size_t k = 0; k < out.size(); ++k)
         ASSERT_EQ(cpp_int(out[k]), expected[k])
             << kernel.name << ", planes " << k / count << " and " << k % count;
@@ -111,11 +111,12 @@ TEST(Kernels, AnyNumberOfRowsAndColumns) {
         for (size_t i = 0; i < row_count; ++i) rows.push_back(planes[kMost - 1 - i].data() + i % 5);
         for (size_t j = 0; j < col_count; ++j) cols.push_back(planes[j].data() + j % 3);
         std::vector<int64_t> expected(row_count * col_count), out(row_count * col_count);
-        reference.dot_products(rows.data(), row_count, cols.data(), col_count, length,
-                               expected.data());
+        reference.add_dot_products(rows.data(), row_count, cols.data(), col_count, 0, length,
+                                   expected.data());
         for (const Kernel& kernel : kernels()) {
-          std::fill(out.begin(), out.end(), -1);
-          kernel.dot_products(rows.data(), row_count, cols.data(), col_count, length, out.data());
+          std::fill(out.begin(), out.end(), 0);
+          kernel.add_dot_products(rows.data(), row_count, cols.data(), col_count, 0, length,
+                                  out.data());
           ASSERT_EQ(out, expected) << kernel.name << ", " << row_count << " x " << col_count << ", "
                                    << length << " pixels";
         }
@@ -131,22 +132,11 @@ TEST(Kernels, AllBlackAndAllWhite) {
       for (const auto& plane : planes) pointers.push_back(plane.data());
       const std::vector<int64_t> expected(81, static_cast<int64_t>(length) * level * level);
       for (const Kernel& kernel : kernels()) {
-        std::vector<int64_t> out(81, -1);
-        kernel.dot_products(pointers.data(), 9, pointers.data(), 9, length, out.data());
+        std::vector<int64_t> out(81);
+        kernel.add_dot_products(pointers.data(), 9, pointers.data(), 9, 0, length, out.data());
         EXPECT_EQ(out, expected) << kernel.name;
       }
     }
-}
-
-TEST(Kernels, TheDefaultIsTheFirst) {
-  ASSERT_FALSE(kernels().empty());
-  const uint8_t samples[] = {255, 0, 7};
-  const uint8_t* plane = samples;
-  int64_t by_default = -1, by_first = -2;
-  dot_products(&plane, 1, &plane, 1, 3, &by_default);
-  kernels().front().dot_products(&plane, 1, &plane, 1, 3, &by_first);
-  EXPECT_EQ(by_default, 255 * 255 + 7 * 7);
-  EXPECT_EQ(by_default, by_first);
 }
 
 TEST(Kernels, HaveNamesOfTheirOwn) {

@@ -16,7 +16,8 @@ constexpr double kRoom = 10;
 
 IntegerMatrix gram_of(const Window& window) {
   // Two threads at most: CI has no more.
-  SlidingGram gram(window.capacity(), 2);
+  Pool pool(2);
+  SlidingGram gram(window.capacity(), &pool);
   gram.add_newest(window, window.size());
   return gram.matrix(window);
 }

@@ -72,7 +72,8 @@ TEST_P(HardCases, FirstFrameAmplitude) {
 // Every combination of options ends, and gives numbers.
 TEST_P(HardCases, NothingIsNaN) {
   const Window window = hard_case().make();
-  SlidingGram sliding(window.capacity(), 2);
+  Pool pool(2);
+  SlidingGram sliding(window.capacity(), &pool);
   sliding.add_newest(window, window.size());
   const IntegerMatrix gram = sliding.matrix(window);
   for (auto method : {Method::qdmd, Method::dmd})

@@ -1,0 +1,72 @@
+// Threads that wait for work, shared by all passes over pixels.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace qdmd {
+
+// Runs the parts of one piece of work on several threads, the caller's among them. The others are
+// started once and sleep between calls. Which thread does which part differs from call to call, so
+// parts must write to places of their own, or combine to the same result in any order.
+class Pool {
+ public:
+  // `threads` counts the caller of run(); fewer work where the system starts no more.
+  // Throws std::bad_alloc.
+  explicit Pool(int threads);
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+  // Not while run() runs.
+  ~Pool();
+
+  // Threads that work, the caller's included; at least 1.
+  size_t threads() const { return workers_.size() + 1; }
+
+  // Calls task(part), or task(part, worker) where it takes both, once for each part < `parts`, and
+  // returns when all are done. 0 <= worker < threads(), and no two calls with the same worker
+  // overlap: what a thread keeps for itself, it keeps there. A task does not throw and does not
+  // call run(). Several threads must not call run() at once. Nothing is allocated.
+  template <typename Task>
+  void run(size_t parts, Task&& task) noexcept {
+    using Plain = std::remove_reference_t<Task>;
+    const auto call = [](const void* what, size_t part, size_t worker) noexcept {
+      auto& plain = *static_cast<Plain*>(const_cast<void*>(what));
+      if constexpr (std::is_invocable_v<Plain&, size_t, size_t>)
+        plain(part, worker);
+      else
+        plain(part);
+    };
+    run_job(parts, {call, std::addressof(task)});
+  }
+
+ private:
+  struct Job {
+    void (*call)(const void* task, size_t part, size_t worker) noexcept = nullptr;
+    const void* task = nullptr;
+  };
+
+  void run_job(size_t parts, Job job) noexcept;
+  void work(size_t worker) noexcept;
+  void do_parts(const Job& job, size_t parts, size_t worker) noexcept;
+
+  std::mutex mutex_;
+  std::condition_variable wake_, idle_;
+  // What the mutex guards.
+  Job job_;                  // open to workers where `call` is set
+  size_t parts_ = 0;         // of job_
+  uint64_t jobs_begun_ = 0;  // a worker joins each of them at most once
+  size_t busy_ = 0;          // workers inside job_
+  bool stopping_ = false;
+
+  std::atomic<size_t> next_part_{0};
+  std::vector<std::thread> workers_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,116 @@
+// The thread pool: every part once, on any number of threads, with the caller among them.
+#include "core/parallel/pool.h"
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <numeric>
+#include <set>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+namespace qdmd::test {
+namespace {
+
+TEST(Pool, DoesEveryPartOnce) {
+  for (int threads : {-1, 0, 1, 2, 3, 8}) {
+    Pool pool(threads);
+    EXPECT_EQ(pool.threads(), static_cast<size_t>(std::max(threads, 1)));
+    for (size_t parts : {0, 1, 2, 3, 7, 1000}) {
+      std::vector<int> done(parts);
+      pool.run(parts, [&](size_t part) { ++done[part]; });
+      EXPECT_EQ(done, std::vector<int>(parts, 1)) << threads << " threads";
+    }
+  }
+}
+
+TEST(Pool, WorkersHaveNumbersOfTheirOwn) {
+  constexpr size_t kThreads = 4, kParts = 400;
+  Pool pool(kThreads);
+  // Unguarded: ThreadSanitizer would see two calls with one number that overlap.
+  std::vector<std::vector<size_t>> parts_of(kThreads);
+  std::vector<std::set<std::thread::id>> ids_of(kThreads);
+  pool.run(kParts, [&](size_t part, size_t worker) {
+    ASSERT_LT(worker, kThreads);
+    parts_of[worker].push_back(part);
+    ids_of[worker].insert(std::this_thread::get_id());
+  });
+  std::vector<size_t> all;
+  for (const auto& parts : parts_of) all.insert(all.end(), parts.begin(), parts.end());
+  std::sort(all.begin(), all.end());
+  std::vector<size_t> expected(kParts);
+  std::iota(expected.begin(), expected.end(), size_t{0});
+  EXPECT_EQ(all, expected);
+  for (size_t worker = 0; worker < kThreads; ++worker)
+    EXPECT_LE(ids_of[worker].size(), 1u) << "one thread a worker";
+  for (const auto id : ids_of[0]) EXPECT_EQ(id, std::this_thread::get_id());
+}
+
+TEST(Pool, ThreadsWorkAtTheSameTime) {
+  Pool pool(3);
+  // Each part waits for the other two: one thread alone would never end.
+  std::atomic<int> begun = 0;
+  pool.run(3, [&](size_t) {
+    ++begun;
+    while (begun < 3) std::this_thread::yield();
+  });
+  EXPECT_EQ(begun, 3);
+}
+
+TEST(Pool, WhatPartsWroteIsSeenByTheCallerAndByTheNextParts) {
+  // Unguarded, over many short calls: ThreadSanitizer watches.
+  Pool pool(4);
+  std::vector<int> values(64);
+  for (int round = 0; round < 2000; ++round) {
+    pool.run(values.size(), [&](size_t part) { ++values[(part + round) % values.size()]; });
+    values[round % values.size()] += 1;
+  }
+  int sum = 0;
+  for (int value : values) sum += value;
+  EXPECT_EQ(sum, 2000 * 64 + 2000);
+}
+
+TEST(Pool, OneSlowThreadLeavesItsPartsToTheOthers) {
+  Pool pool(2);
+  using namespace std::chrono_literals;
+  std::vector<size_t> worker_of(50);
+  pool.run(worker_of.size(), [&](size_t part, size_t worker) {
+    worker_of[part] = worker;
+    std::this_thread::sleep_for(part == 0 ? 100ms : 100us);
+  });
+  EXPECT_LE(std::count(worker_of.begin() + 1, worker_of.end(), worker_of[0]), 10);
+}
+
+TEST(Pool, CanBeMadeAndDestroyedWithoutWork) {
+  for (int k = 0; k < 50; ++k) Pool pool(k % 5);
+}
+
+TEST(Pool, WithoutMoreThreadsTheCallerDoesAll) {
+  // No thread can have a stack larger than the address space.
+  pthread_attr_t before, huge;
+  ASSERT_EQ(pthread_getattr_default_np(&before), 0);
+  ASSERT_EQ(pthread_attr_init(&huge), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&huge, size_t{1} << 50), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&huge), 0);
+  EXPECT_THROW(std::thread([] {}).join(), std::system_error);
+  {
+    Pool pool(4);
+    EXPECT_EQ(pool.threads(), 1u);
+    size_t done = 0;
+    pool.run(10, [&](size_t, size_t worker) {
+      EXPECT_EQ(worker, 0u);
+      ++done;
+    });
+    EXPECT_EQ(done, 10u);
+  }
+  EXPECT_EQ(pthread_setattr_default_np(&before), 0);
+  pthread_attr_destroy(&huge);
+  pthread_attr_destroy(&before);
+}
+
+}  // namespace
+}  // namespace qdmd::test
