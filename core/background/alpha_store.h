@@ -13,7 +13,9 @@ class AlphaStore {
  public:
   explicit AlphaStore(int slots = 0) : entries_(static_cast<size_t>(slots)) {}
 
-  // Remembers the alpha of `frame` (255 where it has none).
+  // Remembers that all alpha samples of the frame in `slot` are `value`.
+  void set_constant(int slot, uint8_t value);
+  // Remembers the alpha samples of `frame`.
   void set(int slot, const ImageView& frame);
   // The samples in row order, or null where all are constant(slot).
   const uint8_t* samples(int slot) const {
@@ -30,5 +32,10 @@ class AlphaStore {
   };
   std::vector<Entry> entries_;
 };
+
+// What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
+inline uint8_t first_alpha(const ImageView& frame) {
+  return frame.alpha && !frame.alpha_is_padding ? *frame.alpha : uint8_t{255};
+}
 
 }  // namespace qdmd

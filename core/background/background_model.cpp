@@ -2,76 +2,121 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 namespace qdmd {
+namespace {
 
-void BackgroundModel::build(const Window& window, const TemporalModel& model) {
-  window_ = &window;
+// rows x J to the order that combine_planes reads.
+template <typename Matrix>
+void group_by_four(const Matrix& rows, std::vector<double>* out) {
+  const Eigen::Index groups = (rows.rows() + 3) / 4;
+  out->assign(static_cast<size_t>(groups * 4 * rows.cols()), 0.0);
+  for (Eigen::Index k = 0; k < rows.rows(); ++k)
+    for (Eigen::Index j = 0; j < rows.cols(); ++j)
+      (*out)[static_cast<size_t>(4 * ((k / 4) * rows.cols() + j) + k % 4)] = rows(k, j);
+}
+
+constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+}  // namespace
+
+void BackgroundModel::make_pictures(size_t count) {
+  samples_.resize(count * pixels_);
+  pictures_.resize(count);
+  for (size_t k = 0; k < count; ++k) pictures_[k] = samples_.data() + k * pixels_;
+}
+
+void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel& model,
+                            bool keep_pictures) {
   model_ = model;
   basis_ = model.basis();
-  pixels_ = window.pixels();
+  pixels_ = snapshots.pixels();
+  frozen_ = false;
+  planes_.clear();
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
   const auto pictures = static_cast<size_t>(basis_.rows());
-  direct_ = pictures * sizeof(float) > static_cast<size_t>(kChannels * window.size());
-  if (direct_) {
-    pictures_.clear();
-    return;
-  }
-  pictures_.resize(pictures * pixels_);
-  // A matrix product over short runs of pixels, whose samples fit in the cache as doubles: at full
-  // rank the coefficients of nearly parallel frames cancel, and single precision would show it.
+  direct_ = !keep_pictures &&
+            pictures * sizeof(float) > static_cast<size_t>(kChannels * snapshots.size());
+  make_pictures(direct_ ? 0 : pictures);
+  if (!direct_) group_by_four(basis_, &coefficients_);
+}
+
+void BackgroundModel::build_slice(size_t first, size_t count) {
+  if (direct_) return;
+  // Short runs, whose samples of all planes stay in the second-level cache for every group of
+  // pictures.
   constexpr size_t kRun = 256;
-  using RunMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  RunMatrix samples = RunMatrix::Zero(basis_.cols(), kRun), levels(basis_.rows(), kRun);
-  for (size_t first = 0; first < pixels_; first += kRun) {
-    const size_t count = std::min(kRun, pixels_ - first);
-    for (int t = 0; t < window.size(); ++t)
-      for (int c = 0; c < kChannels; ++c)
-        std::copy_n(window.plane(window.slot(t), c) + first, count,
-                    samples.row(kChannels * t + c).data());
-    levels.noalias() = basis_ * samples;
-    for (size_t k = 0; k < pictures; ++k) {
-      const double* level = levels.row(static_cast<Eigen::Index>(k)).data();
-      std::transform(level, level + count, pictures_.data() + k * pixels_ + first,
-                     [](double v) { return static_cast<float>(v); });
+  std::array<float*, 4> sums;
+  const size_t end = first + count;
+  for (; first < end; first += kRun)
+    for (size_t k = 0; k < picture_count(); k += 4) {
+      const size_t group = std::min<size_t>(4, picture_count() - k);
+      for (size_t i = 0; i < group; ++i) sums[i] = pictures_[k + i] + first;
+      combine_planes(coefficients_.data() + k * planes_.size(), group, planes_.data(),
+                     planes_.size(), first, std::min(kRun, end - first), sums.data());
     }
-  }
+}
+
+void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel& model) {
+  begin(snapshots, model);
+  build_slice(0, pixels_);
 }
 
 void BackgroundModel::set_time(double t) {
-  const Eigen::MatrixXd weights =
-      direct_ ? Eigen::MatrixXd(model_.weights(t) * basis_) : model_.weights(t);
-  terms_ = weights.cols();
-  weights_.resize(static_cast<size_t>(weights.size()));
-  for (Eigen::Index c = 0; c < kChannels; ++c)
-    for (Eigen::Index k = 0; k < terms_; ++k)
-      weights_[static_cast<size_t>(c * terms_ + k)] = static_cast<float>(weights(c, k));
+  if (frozen_) return;
+  model_.weights(t, &time_weights_);
+  if (direct_) {
+    direct_weights_.noalias() = time_weights_ * basis_;
+    group_by_four(direct_weights_, &coefficients_);
+    return;
+  }
+  const size_t pictures = picture_count();
+  weights_.resize(3 * pictures);
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t k = 0; k < pictures; ++k)
+      weights_[c * pictures + k] = static_cast<float>(
+          time_weights_(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(k)));
+}
+
+void BackgroundModel::combine_directly(size_t first, size_t count, float* const* out) const {
+  combine_planes(coefficients_.data(), 3, planes_.data(), planes_.size(), first, count, out);
 }
 
 void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
-  std::array<float, kMaxRun> sum;
-  for (int c = 0; c < kChannels; ++c) {
-    // Adding a half and truncating rounds to nearest in the range that survives the clamp.
-    std::fill_n(sum.begin(), count, 0.5f);
-    const float* weights = weights_.data() + c * terms_;
-    for (Eigen::Index k = 0; k < terms_; ++k) {
-      const float weight = weights[k];
-      if (weight == 0) continue;
-      if (direct_) {
-        const int t = static_cast<int>(k) / kChannels;
-        const uint8_t* plane =
-            window_->plane(window_->slot(t), static_cast<int>(k) % kChannels) + first;
-        for (size_t p = 0; p < count; ++p) sum[p] += weight * static_cast<float>(plane[p]);
-      } else {
-        const float* picture = pictures_.data() + static_cast<size_t>(k) * pixels_ + first;
-        for (size_t p = 0; p < count; ++p) sum[p] += weight * picture[p];
-      }
-    }
-    uint8_t* row = out[c];
-    for (size_t p = 0; p < count; ++p)
-      // The order of the comparisons sends a NaN (infinity less infinity) to zero.
-      row[p] = static_cast<uint8_t>(sum[p] > 0.0f ? (sum[p] < 255.5f ? sum[p] : 255.0f) : 0.0f);
+  if (!direct_) {
+    levels_of(weights_.data(), pictures_.data(), picture_count(), first, count, out);
+    return;
   }
+  std::array<std::array<float, kMaxRun + kSliceUnit>, 3> sums;
+  float* const rows[3] = {sums[0].data(), sums[1].data(), sums[2].data()};
+  const size_t offset = first % kSliceUnit;
+  combine_directly(first - offset, count + offset, rows);
+  levels_of(kIdentity.data(), rows, 3, offset, count, out);
+}
+
+void BackgroundModel::freeze_at(double t) {
+  if (frozen_) return;
+  set_time(t);
+  if (direct_) {
+    make_pictures(3);
+    combine_directly(0, pixels_, pictures_.data());
+  } else {
+    // The pictures make room for L(t), pixel by pixel.
+    const size_t pictures = picture_count();
+    samples_.resize(std::max<size_t>(pictures, 3) * pixels_);
+    for (size_t p = 0; p < pixels_; ++p) {
+      std::array<float, 3> level{};
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t k = 0; k < pictures; ++k)
+          level[c] += weights_[c * pictures + k] * samples_[k * pixels_ + p];
+      for (size_t c = 0; c < 3; ++c) samples_[c * pixels_ + p] = level[c];
+    }
+    make_pictures(3);
+  }
+  direct_ = false;
+  frozen_ = true;
+  weights_.assign(kIdentity.begin(), kIdentity.end());
 }
 
 }  // namespace qdmd

@@ -1,8 +1,10 @@
 // The pictures of a solved window: evaluates L(t) at pixels.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
+#include "core/background/combine.h"
 #include "core/dmd/temporal_model.h"
 #include "core/gram/window.h"
 
@@ -13,8 +15,22 @@ namespace qdmd {
 // combine the window's frames directly at 9 m products per pixel.
 class BackgroundModel {
  public:
-  // `window` is read here and, while the combination is direct, until the next build.
-  void build(const Window& window, const TemporalModel& model);
+  // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
+  // direct, until the next build.
+  void build(const SnapshotRange& snapshots, const TemporalModel& model);
+  // The same in pieces: begin(), then build_slice() for slices that cover each pixel once, by any
+  // thread, in any order. Slices start at multiples of kSliceUnit pixels.
+  // keep_pictures: never combine directly.
+  void begin(const SnapshotRange& snapshots, const TemporalModel& model,
+             bool keep_pictures = false);
+  void build_slice(size_t first, size_t count);
+  static constexpr size_t kSliceUnit = 64;
+
+  // The most modes whose pictures take no more memory than a window of `snapshots`.
+  static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
+
+  // From now on L(t) is this L for every t, and the snapshots are no longer needed.
+  void freeze_at(double t);
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);
@@ -22,18 +38,23 @@ class BackgroundModel {
   // array a channel. count <= kMaxRun.
   void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
 
-  static constexpr size_t kMaxRun = 1024;
-
  private:
-  const Window* window_ = nullptr;
+  size_t picture_count() const { return pictures_.size(); }
+  // The same before rounding, at a `first` that is a multiple of kSliceUnit, where the combination
+  // is direct.
+  void combine_directly(size_t first, size_t count, float* const* out) const;
+  void make_pictures(size_t count);
+
   TemporalModel model_;
-  Eigen::MatrixXd basis_;
-  bool direct_ = false;
+  Eigen::MatrixXd basis_, time_weights_, direct_weights_;
+  bool direct_ = false, frozen_ = false;
   size_t pixels_ = 0;
-  std::vector<float> pictures_;  // picture k at k * pixels_
-  // 3 x K over pictures, or 3 x 3m over the window's planes; row-major by channel.
-  std::vector<float> weights_;
-  Eigen::Index terms_ = 0;
+  std::vector<const uint8_t*> planes_;  // of the snapshots, in time order
+  std::vector<double>
+      coefficients_;            // of the pictures, or of L(t) where direct_, for combine_planes
+  std::vector<float> samples_;  // of the pictures, one after another
+  std::vector<float*> pictures_;
+  std::vector<float> weights_;  // 3 x K over pictures
 };
 
 }  // namespace qdmd

@@ -1,24 +1,20 @@
 #include "core/background/engine.h"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <thread>
 
-#include "core/dmd/decompose.h"
-#include "core/dmd/qdmd.h"
+#include "core/background/planes.h"
 
 namespace qdmd {
 namespace {
 
-// Frames that enter the Gram matrix together: few enough that little is left to do when a window is
-// full, enough that they fill a register tile and the window is not read from memory for each of
-// them.
+// Frames that enter the Gram matrix together in batch mode: few enough that little is left to do
+// when a window is full, enough that they fill a register tile and the window is not read from
+// memory for each of them.
 constexpr int kGramGroup = 16;
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
+// Pixels whose share of a pass is worth waking a thread for.
+constexpr size_t kPixelsPerPart = 32768;
 
 int thread_count(const EngineOptions& options) {
   if (options.threads > 0) return options.threads;
@@ -27,66 +23,72 @@ int thread_count(const EngineOptions& options) {
                                                unsigned{EngineOptions::kMaxThreads}));
 }
 
-void copy_plane(const uint8_t* from, const ImageView& frame, uint8_t* to) {
-  for (int row = 0; row < frame.height; ++row, from += frame.row_stride, to += frame.width) {
-    const uint8_t* sample = from;
-    for (int col = 0; col < frame.width; ++col, sample += frame.pixel_stride) to[col] = *sample;
-  }
-}
-
-Status check(const EngineOptions& options, int width, int height) {
-  using Code = Status::Code;
-  if (width < 1 || height < 1) return {Code::invalid_options, "a frame needs at least one pixel"};
-  if (options.window_size < EngineOptions::kMinWindow ||
-      options.window_size > EngineOptions::kMaxWindow)
-    return {Code::invalid_options, "window-size must be 2 to 2048 frames"};
-  if (options.dmd.rank < 0 || !(options.dmd.omega_threshold >= 0) ||
-      !(options.foreground_threshold >= 0))
-    return {Code::invalid_options,
-            "rank, omega-threshold and foreground-threshold must not be negative"};
-  if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
-    return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
-  const std::string frames = std::to_string(options.window_size) + " frames of " +
-                             std::to_string(width) + "x" + std::to_string(height);
-  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  const uint64_t window = Window::bytes(options.window_size, pixels);
-  if (window > options.max_memory)
-    return {Code::too_much_memory,
-            "A window-size of " + frames + " needs " + std::to_string(window) +
-                " bytes and max-memory allows " + std::to_string(options.max_memory) +
-                ": lower window-size, scale the video down, or raise max-memory."};
-  if (options.dmd.method == Method::qdmd && options.dmd.solver == Solver::adjoint) {
-    const double solver = adjoint_bytes(static_cast<double>(pixels), options.window_size);
-    if (solver > static_cast<double>(options.max_memory))
-      return {Code::too_much_memory,
-              "solver=adjoint with a window-size of " + frames + " needs about " +
-                  std::to_string(static_cast<uint64_t>(solver)) + " bytes and max-memory allows " +
-                  std::to_string(options.max_memory) +
-                  ": use solver=gram, lower window-size, or scale the video down."};
-  }
-  return {};
+// Calls pass(first_row, row_count) for bands of a picture's rows.
+template <typename Pass>
+void for_bands(Pool& pool, int width, int height, Pass pass) {
+  const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  const auto bands =
+      static_cast<int>(std::clamp<size_t>(pixels / kPixelsPerPart, 1, static_cast<size_t>(height)));
+  pool.run(static_cast<size_t>(bands), [&](size_t band) {
+    const auto row = [&](size_t b) {
+      return static_cast<int>(int64_t{height} * static_cast<int64_t>(b) / bands);
+    };
+    pass(row(band), row(band + 1) - row(band));
+  });
 }
 
 }  // namespace
 
 Status Engine::configure(const EngineOptions& options, int width, int height) {
-  const Status status = check(options, width, height);
+  const Status status = check_options(options, width, height);
   if (!status.ok()) return status;
+  if (side_) live_.stop();
+  const EngineLayout layout = layout_of(options, width, height);
+  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   options_ = options;
   width_ = width;
   height_ = height;
-  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   // The old window goes first: two at once would break the promise of max-memory.
   window_ = Window();
-  window_ = Window(options.window_size, pixels);
-  gram_ = SlidingGram();
-  pool_ = std::make_unique<Pool>(thread_count(options));
-  gram_ = SlidingGram(options.window_size, pool_.get());
-  alpha_ = AlphaStore(options.window_size);
-  report_ = SolveReport();
+  solver_ = WindowSolver();
+  window_ = Window(layout.capacity, pixels);
+  const int threads = thread_count(options);
+  pool_ = std::make_unique<Pool>(threads);
+  side_ = std::make_unique<SideThread>(threads > 1);
+  DmdOptions dmd = options.dmd;
+  const bool live = options.mode == Mode::live;
+  // Where frames make room for others before their model is used, its modes are pictures.
+  if (live) dmd.max_modes = BackgroundModel::most_modes(options.window_size);
+  solver_ =
+      WindowSolver(dmd, layout.capacity, width, height, layout.sample_step, live, pool_.get());
+  live_ = LiveSolver(LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels)),
+                     &solver_, side_.get());
+  alpha_ = AlphaStore(layout.capacity);
   solves_ = 0;
   flush();
   return {};
+}
+
+void Engine::flush() {
+  if (side_) live_.stop();
+  window_.clear();
+  solver_.clear();
+  live_.restart(false);
+  pending_ = ready_ = not_in_gram_ = 0;
+  has_model_ = start_new_window_ = frozen_ = false;
+}
+
+// Makes room for the frame and splits it.
+void Engine::take_in(const ImageView& frame) {
+  const int slot = window_.append();
+  uint8_t* const planes[3] = {window_.plane(slot, 0), window_.plane(slot, 1),
+                              window_.plane(slot, 2)};
+  const uint8_t alpha = first_alpha(frame);
+  if (split_channels(frame, 0, height_, alpha, planes))
+    alpha_.set_constant(slot, alpha);
+  else
+    alpha_.set(slot, frame);
+  ++pending_;
 }
 
 Status Engine::push(const ImageView& frame) {
@@ -96,72 +98,128 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
   if (frame.width != width_ || frame.height != height_)
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
-  if (start_new_window_) flush();
-  const int slot = window_.append();
-  for (int c = 0; c < kChannels; ++c) copy_plane(frame.channel[c], frame, window_.plane(slot, c));
-  alpha_.set(slot, frame);
-  ++pending_;
-  // Frames of the window before are left out: they count only if this window ends early.
-  if (++not_in_gram_ == std::min(kGramGroup, options_.window_size))
-    update_gram(not_in_gram_, pending_);
-  if (pending_ == options_.window_size) solve();
+  if (options_.mode == Mode::live)
+    push_live(frame);
+  else
+    push_batch(frame);
   return {};
+}
+
+void Engine::push_batch(const ImageView& frame) {
+  if (pending_ == 0 && has_model_ && freeze_ != frozen_) {
+    // The model may still read its window, whose frames are about to make room. Frames that came
+    // meanwhile are in no Gram matrix.
+    if (freeze_)
+      solver_.model().freeze_at(window_.size() - 1);
+    else
+      start_new_window_ = true;
+    frozen_ = freeze_;
+  }
+  if (start_new_window_) {
+    side_->finish();
+    window_.clear();
+    solver_.clear();
+    start_new_window_ = false;
+    not_in_gram_ = 0;
+  }
+  take_in(frame);
+  solver_.append(window_);
+  // Frames of the window before are left out: they count only if this window ends early.
+  if (++not_in_gram_ == std::min(kGramGroup, options_.window_size) && !frozen_)
+    add_group(not_in_gram_);
+  if (pending_ == options_.window_size) solve();
+}
+
+// Goes on beside the frames that follow.
+void Engine::add_group(int frames) {
+  side_->finish();
+  not_in_gram_ = 0;
+  side_->start([this, frames, span = SnapshotRange(window_).newest(pending_)] {
+    solver_.add_to_gram(span, frames);
+  });
+}
+
+// Batch: a model for the window as it is.
+void Engine::solve() {
+  ready_ = pending_;
+  if (frozen_) {
+    not_in_gram_ = 0;
+    return;
+  }
+  side_->finish();
+  const SnapshotRange window(window_);
+  if (pending_ < window_.size())
+    solver_.add_to_gram(window, pending_);
+  else if (not_in_gram_ > 0)
+    solver_.add_to_gram(window, not_in_gram_);
+  not_in_gram_ = 0;
+  solver_.decompose(window);
+  solver_.build();
+  solver_.finish(options_.foreground_threshold);
+  solver_.publish();
+  has_model_ = true;
+  ++solves_;
+}
+
+void Engine::push_live(const ImageView& frame) {
+  const auto count = [this](bool published) {
+    if (!published) return;
+    has_model_ = true;
+    frozen_ = false;
+    ++solves_;
+  };
+  const bool freeze = freeze_ && has_model_;
+  if (!freeze) count(live_.settle());
+  if (freeze || start_new_window_) {
+    live_.stop();
+    if (has_model_ && !frozen_) {
+      solver_.model().freeze_at(live_.time());
+      frozen_ = true;
+    }
+    window_.clear();
+    solver_.clear();
+    live_.restart(has_model_);
+    start_new_window_ = false;
+  }
+  take_in(frame);
+  if (!freeze) {
+    solver_.append(window_);
+    count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_));
+  }
+  ready_ = 1;
 }
 
 Status Engine::drain() {
   if (window_.capacity() == 0)
     return {Status::Code::not_configured, "configure the engine before draining it"};
-  if (pending_ > ready_) solve();
+  if (options_.mode == Mode::batch && pending_ > ready_) solve();
   start_new_window_ = true;
   return {};
 }
 
-void Engine::flush() {
-  window_.clear();
-  pending_ = ready_ = 0;
-  start_new_window_ = false;
-  not_in_gram_ = 0;
-  gram_seconds_ = 0;
-}
-
-void Engine::update_gram(int count, int span) {
-  const auto start = std::chrono::steady_clock::now();
-  gram_.add_newest(window_, count, span);
-  not_in_gram_ = 0;
-  gram_seconds_ += seconds_since(start);
-}
-
-void Engine::solve() {
-  if (pending_ < window_.size())
-    update_gram(pending_, window_.size());
-  else if (not_in_gram_ > 0)
-    update_gram(not_in_gram_, pending_);
-  const auto start = std::chrono::steady_clock::now();
-  const Decomposition decomposition = decompose(window_, gram_.matrix(window_), options_.dmd);
-  report_.solve_time = seconds_since(start);
-  report_.dmd = decomposition.summary;
-  report_.window_frames = window_.size();
-  model_.build(window_, decomposition.background);
-  report_.foreground = foreground_statistics(window_, model_, options_.foreground_threshold);
-  report_.gram_time = gram_seconds_;
-  gram_seconds_ = 0;
-  ++solves_;
-  ready_ = pending_;
-}
-
 void Engine::set_foreground_threshold(double threshold) {
   options_.foreground_threshold = threshold;
-  report_.foreground.threshold =
-      threshold > 0 ? threshold : automatic_threshold(report_.foreground.noise);
+  ForegroundStatistics& foreground = solver_.report().foreground;
+  foreground.threshold = threshold > 0 ? threshold : automatic_threshold(foreground.noise);
 }
 
 void Engine::pop(Output output, const MutableImageView& out) {
   if (ready_ == 0) return;
   const int index = window_.size() - pending_;
   const int slot = window_.slot(index);
-  model_.set_time(index);
-  write_output(window_, slot, model_, output, report_.foreground.threshold, alpha_.samples(slot),
-               alpha_.constant(slot), out);
+  BackgroundModel& model = solver_.model();
+  model.set_time(options_.mode == Mode::live ? live_.time() : index);
+  const OutputTask task = {{window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
+                           &model,
+                           output,
+                           solver_.report().foreground.threshold,
+                           alpha_.samples(slot),
+                           alpha_.constant(slot)};
+  if (side_->idle())
+    for_bands(*pool_, width_, height_,
+              [&](int first, int count) { write_output(task, out, first, count); });
+  else
+    write_output(task, out, 0, height_);
   --pending_;
   --ready_;
 }

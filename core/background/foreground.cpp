@@ -3,44 +3,26 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "core/background/planes.h"
+#include "core/background/residual.h"
 
 namespace qdmd {
 namespace {
 
-constexpr size_t kRun = BackgroundModel::kMaxRun;
-
 // L(t) of one run of pixels.
 struct BackgroundRun {
-  std::array<std::array<uint8_t, kRun>, kChannels> level;
-
-  void evaluate(const BackgroundModel& model, size_t first, size_t count) {
-    uint8_t* const rows[3] = {level[0].data(), level[1].data(), level[2].data()};
-    model.evaluate(first, count, rows);
-  }
-};
-
-int squared_distance(const uint8_t* const x[3], const BackgroundRun& l, size_t p) {
-  int sum = 0;
-  for (size_t c = 0; c < kChannels; ++c) {
-    const int difference = x[c][p] - l.level[c][p];
-    sum += difference * difference;
-  }
-  return sum;
-}
-
-struct Planes {
-  const uint8_t* channel[3];
-  Planes(const Window& window, int slot, size_t first) {
-    for (int c = 0; c < kChannels; ++c) channel[c] = window.plane(slot, c) + first;
-  }
+  alignas(64) uint8_t level[3][kMaxRun];
+  uint8_t* const rows[3] = {level[0], level[1], level[2]};
 };
 
 }  // namespace
 
 double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
 
-ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel& model,
+ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
@@ -49,20 +31,24 @@ ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel
   std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{};
   uint64_t total = 0;
   BackgroundRun background;
-  const int frames = std::min(kFrames, window.size());
-  const size_t runs = (window.pixels() + kRun - 1) / kRun;
+  const int frames = std::min(kFrames, snapshots.size());
+  const size_t runs = (snapshots.pixels() + kMaxRun - 1) / kMaxRun;
   const size_t step = (runs + kRunsPerFrame - 1) / kRunsPerFrame;
   for (int i = 0; i < frames; ++i) {
-    const int t = frames == 1 ? 0 : i * (window.size() - 1) / (frames - 1);
+    const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
     model.set_time(t);
     // Other frames look at other runs.
     for (size_t run = static_cast<size_t>(i) % std::max<size_t>(step, 1); run < runs; run += step) {
-      const size_t first = run * kRun;
-      const size_t count = std::min(kRun, window.pixels() - first);
-      background.evaluate(model, first, count);
-      const Planes x(window, window.slot(t), first);
+      const size_t first = run * kMaxRun;
+      const size_t count = std::min(kMaxRun, snapshots.pixels() - first);
+      model.evaluate(first, count, background.rows);
       for (size_t p = 0; p < count; ++p) {
-        const double norm = std::sqrt(squared_distance(x.channel, background, p));
+        int squared = 0;
+        for (int c = 0; c < kChannels; ++c) {
+          const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
+          squared += difference * difference;
+        }
+        const double norm = std::sqrt(squared);
         ++histogram[static_cast<size_t>(norm * kBinsPerLevel)];
       }
       total += count;
@@ -84,57 +70,51 @@ ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel
   return statistics;
 }
 
-void write_output(const Window& window, int slot, const BackgroundModel& model, Output output,
-                  double threshold, const uint8_t* alpha, uint8_t constant_alpha,
-                  const MutableImageView& out) {
-  const auto width = static_cast<size_t>(out.width);
-  const double squared_threshold = threshold * threshold;
+void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
+                  int row_count) {
+  const bool masked = task.output == Output::mask || task.output == Output::cutout;
   BackgroundRun background;
-  for (int row = 0; row < out.height; ++row) {
-    for (size_t left = 0; left < width; left += kRun) {
-      const size_t count = std::min(kRun, width - left);
-      const size_t first = static_cast<size_t>(row) * width + left;
-      background.evaluate(model, first, count);
-      const Planes x(window, slot, first);
-      const ptrdiff_t start =
-          row * out.row_stride + static_cast<ptrdiff_t>(left) * out.pixel_stride;
-      std::array<uint8_t, kRun> foreground;
-      if (output == Output::mask || output == Output::cutout)
-        for (size_t p = 0; p < count; ++p)
-          foreground[p] = squared_distance(x.channel, background, p) > squared_threshold ? 255 : 0;
-      for (size_t c = 0; c < kChannels; ++c) {
-        uint8_t* to = out.channel[c] + start;
-        const uint8_t* from = x.channel[c];
-        const uint8_t* level = background.level[c].data();
-        const ptrdiff_t stride = out.pixel_stride;
-        switch (output) {
+  alignas(64) uint8_t made[3][kMaxRun], mask[kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun];
+  if (out.alpha)
+    std::memset(constant_alpha, out.alpha_is_padding ? 255 : task.constant_alpha, kMaxRun);
+  const auto image_width = static_cast<size_t>(out.width);
+  size_t rows = static_cast<size_t>(row_count), width = image_width;
+  // Rows without gaps are one long row.
+  if (out.row_stride == out.pixel_stride * out.width) width *= std::exchange(rows, 1);
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t left = 0; left < width; left += kMaxRun) {
+      const size_t count = std::min(kMaxRun, width - left);
+      const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
+      task.model->evaluate(first, count, background.rows);
+      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      if (masked) foreground_mask(x, background.rows, count, task.threshold, mask);
+      const uint8_t* channels[3];
+      for (int c = 0; c < kChannels; ++c) {
+        channels[c] = made[c];
+        switch (task.output) {
           case Output::background:
-            for (size_t p = 0; p < count; ++p, to += stride) *to = level[p];
+            channels[c] = background.level[c];
             break;
           case Output::foreground:
-            for (size_t p = 0; p < count; ++p, to += stride)
-              *to = static_cast<uint8_t>(std::abs(from[p] - level[p]));
+            absolute_residual(x[c], background.level[c], count, made[c]);
             break;
           case Output::mask:
-            for (size_t p = 0; p < count; ++p, to += stride) *to = foreground[p];
+            channels[c] = mask;
             break;
           case Output::cutout:
-            for (size_t p = 0; p < count; ++p, to += stride) *to = from[p] & foreground[p];
+            apply_mask(x[c], mask, count, made[c]);
             break;
         }
       }
-      if (!out.alpha) continue;
-      uint8_t* to = out.alpha + start;
-      for (size_t p = 0; p < count; ++p, to += out.pixel_stride) {
-        if (out.alpha_is_padding) {
-          *to = 255;
-          continue;
-        }
-        const uint8_t own = alpha ? alpha[first + p] : constant_alpha;
-        *to = output == Output::cutout ? own & foreground[p] : own;
+      const uint8_t* own = constant_alpha;
+      if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
+      if (task.output == Output::cutout && out.alpha && !out.alpha_is_padding) {
+        apply_mask(own, mask, count, alpha);
+        own = alpha;
       }
+      join_channels(channels, own, count, out, first_row + static_cast<int>(row),
+                    static_cast<int>(left));
     }
-  }
 }
 
 }  // namespace qdmd

@@ -27,14 +27,22 @@ double automatic_threshold(double noise);
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
 // `fixed_threshold`, or, where that is 0, the automatic one.
 // Leaves the model's time at the last sampled snapshot.
-ForegroundStatistics foreground_statistics(const Window& window, BackgroundModel& model,
+ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold);
 
-// Writes the picture `output` of the snapshot in `slot` of `window` against the model at its
-// current time. `alpha`: the frame's own alpha samples in row order, or null where all of them are
-// `constant_alpha`.
-void write_output(const Window& window, int slot, const BackgroundModel& model, Output output,
-                  double threshold, const uint8_t* alpha, uint8_t constant_alpha,
-                  const MutableImageView& out);
+// One frame of a window and what its pictures are made of.
+struct OutputTask {
+  const uint8_t* x[3];           // the frame's planes
+  const BackgroundModel* model;  // at the frame's time
+  Output output;
+  double threshold;        // quaternion norm, grey levels
+  const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
+  uint8_t constant_alpha;  // this
+};
+
+// Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write
+// different rows.
+void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
+                  int row_count);
 
 }  // namespace qdmd

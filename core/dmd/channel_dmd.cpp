@@ -25,9 +25,10 @@ Spectrum positive_spectrum(const Eigen::MatrixXd& g, Index limit) {
   return {values.head(rank), eigen.eigenvectors().rowwise().reverse().leftCols(rank)};
 }
 
-// The nearest modes, completed by the conjugates of non-real ones.
-std::vector<Index> select_with_conjugates(const Eigen::VectorXcd& values, double threshold) {
-  std::vector<Index> chosen = select_background<double>(values, threshold);
+// The nearest modes, `limit` at most, completed by the conjugates of non-real ones.
+std::vector<Index> select_with_conjugates(const Eigen::VectorXcd& values, double threshold,
+                                          int limit) {
+  std::vector<Index> chosen = select_background<double>(values, threshold, limit);
   const size_t count = chosen.size();
   for (size_t i = 0; i < count; ++i) {
     const Index k = chosen[i];
@@ -67,7 +68,7 @@ ChannelModes channel_dmd(const Eigen::MatrixXd& g, const DmdOptions& options) {
   const Eigen::MatrixXcd w = eigen.eigenvectors();
   const Eigen::MatrixXcd lower = v_over_s.cast<std::complex<double>>() * w;
 
-  const auto chosen = select_with_conjugates(values, options.omega_threshold);
+  const auto chosen = select_with_conjugates(values, options.omega_threshold, options.max_modes);
   const Index modes = static_cast<Index>(chosen.size());
   result.eigenvalues.resize(modes);
   result.combination = Eigen::MatrixXcd::Zero(m, modes);

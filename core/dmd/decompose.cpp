@@ -6,14 +6,13 @@
 namespace qdmd {
 namespace {
 
-QuaternionMatrixd pixels_of(const Window& window) {
-  const auto n = static_cast<Eigen::Index>(window.pixels());
-  QuaternionMatrixd x(n, window.size());
-  for (int t = 0; t < window.size(); ++t) {
-    const int slot = window.slot(t);
-    const uint8_t* r = window.plane(slot, 0);
-    const uint8_t* g = window.plane(slot, 1);
-    const uint8_t* b = window.plane(slot, 2);
+QuaternionMatrixd pixels_of(const SnapshotRange& snapshots) {
+  const auto n = static_cast<Eigen::Index>(snapshots.pixels());
+  QuaternionMatrixd x(n, snapshots.size());
+  for (int t = 0; t < snapshots.size(); ++t) {
+    const uint8_t* r = snapshots.plane(t, 0);
+    const uint8_t* g = snapshots.plane(t, 1);
+    const uint8_t* b = snapshots.plane(t, 2);
     for (Eigen::Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
   }
   return x;
@@ -48,13 +47,13 @@ Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& op
 
 }  // namespace
 
-BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram,
+BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                                  const DmdOptions& options) {
   switch (options.solver) {
     case Solver::qr:
-      return qdmd_from_qr(window, options);
+      return qdmd_from_qr(snapshots, options);
     case Solver::adjoint:
-      return qdmd_from_adjoint(pixels_of(window), options);
+      return qdmd_from_adjoint(pixels_of(snapshots), options);
     case Solver::gram:
     case Solver::gram_extended:
       break;
@@ -62,11 +61,11 @@ BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram
   return qdmd_from_gram(quaternion_gram(gram), options);
 }
 
-Decomposition decompose(const Window& window, const IntegerMatrix& gram,
+Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                         const DmdOptions& options) {
   if (gram.rows() == kChannels) return single_snapshot();
   if (options.method == Method::dmd) return decompose_channels(gram, options);
-  const BackgroundModes modes = quaternion_modes(window, gram, options);
+  const BackgroundModes modes = quaternion_modes(snapshots, gram, options);
   Decomposition result;
   result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
   for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)

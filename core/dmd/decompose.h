@@ -14,11 +14,12 @@ struct Decomposition {
 
 // Q-DMD of the window by the solver that `options` names; arguments as below. Options::method is
 // not looked at.
-BackgroundModes quaternion_modes(const Window& window, const IntegerMatrix& gram,
+BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                                  const DmdOptions& options);
 
 // `gram` is the exact Gram matrix of `window` in time order (3m x 3m). The pixels are read by
 // Solver::qr and Solver::adjoint only. m >= 1; a single snapshot is its own background.
-Decomposition decompose(const Window& window, const IntegerMatrix& gram, const DmdOptions& options);
+Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
+                        const DmdOptions& options);
 
 }  // namespace qdmd

@@ -44,11 +44,11 @@ Real omega_magnitude(const std::complex<Real>& lambda) {
 }
 
 // Indices of the background modes, nearest to the origin first: all with |omega| <= threshold, or
-// the nearest one where none is (or threshold is 0). Equal distances keep their order. Empty only
-// for no eigenvalues.
+// the nearest one where none is (or threshold is 0), at most `limit` (0: any number). Equal
+// distances keep their order. Empty only for no eigenvalues.
 template <typename Real>
 std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalues,
-                                            double threshold) {
+                                            double threshold, int limit = 0) {
   std::vector<Real> omega(static_cast<size_t>(eigenvalues.size()));
   for (size_t k = 0; k < omega.size(); ++k)
     omega[k] = omega_magnitude(eigenvalues(static_cast<Eigen::Index>(k)));
@@ -63,6 +63,7 @@ std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalu
   size_t count = 0;
   while (threshold > 0 && count < order.size() && omega_of(order[count]) <= Real(threshold))
     ++count;
+  if (limit > 0) count = std::min(count, static_cast<size_t>(limit));
   order.resize(std::min(order.size(), std::max<size_t>(count, 1)));
   return order;
 }

@@ -31,6 +31,9 @@ struct DmdOptions {
   // Background: all modes with |omega| <= this, in rad/frame. 0, or no mode that near: the one
   // nearest the origin.
   double omega_threshold = 0;
+  // The most modes that count as background (of Method::dmd: in each channel), the nearest to the
+  // origin first; 0: no limit.
+  int max_modes = 0;
 };
 
 // Facts about one solve, of the mode nearest the origin (for Method::dmd: of the channel whose

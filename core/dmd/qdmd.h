@@ -16,7 +16,7 @@ BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& opt
 // the Gram matrix is not used. Time grows with n m^2, at many times the cost of the Gram matrix;
 // memory is some hundred rows. Singular values below max(n, m) epsilon of the largest count as
 // zero.
-BackgroundModes qdmd_from_qr(const Window& window, const DmdOptions& options);
+BackgroundModes qdmd_from_qr(const SnapshotRange& snapshots, const DmdOptions& options);
 
 // The paper's procedure on the pixels themselves, x = [x_1 .. x_m] (n x m): the SVD of the complex
 // adjoint of X and its odd columns, eigenvectors of the adjoint of Q~, Phi^+ x_1 on pixels. Time

@@ -7,17 +7,16 @@ namespace {
 using Index = Eigen::Index;
 
 // Rows [first, first + count) of the n x m matrix of snapshots, below `above`.
-QuaternionMatrixd stacked(const QuaternionMatrixd& above, const Window& window, Index first,
-                          Index count) {
-  const Index m = window.size(), top = above.rows();
+QuaternionMatrixd stacked(const QuaternionMatrixd& above, const SnapshotRange& snapshots,
+                          Index first, Index count) {
+  const Index m = snapshots.size(), top = above.rows();
   QuaternionMatrixd stack(top + count, m);
   stack.a.topRows(top) = above.a;
   stack.b.topRows(top) = above.b;
-  for (int t = 0; t < window.size(); ++t) {
-    const int slot = window.slot(t);
-    const uint8_t* r = window.plane(slot, 0) + first;
-    const uint8_t* g = window.plane(slot, 1) + first;
-    const uint8_t* b = window.plane(slot, 2) + first;
+  for (int t = 0; t < snapshots.size(); ++t) {
+    const uint8_t* r = snapshots.plane(t, 0) + first;
+    const uint8_t* g = snapshots.plane(t, 1) + first;
+    const uint8_t* b = snapshots.plane(t, 2) + first;
     for (Index p = 0; p < count; ++p) stack.set(top + p, t, Quaterniond(0.0, r[p], g[p], b[p]));
   }
   return stack;
@@ -25,15 +24,15 @@ QuaternionMatrixd stacked(const QuaternionMatrixd& above, const Window& window, 
 
 }  // namespace
 
-BackgroundModes qdmd_from_qr(const Window& window, const DmdOptions& options) {
-  const Index m = window.size(), n = static_cast<Index>(window.pixels());
+BackgroundModes qdmd_from_qr(const SnapshotRange& snapshots, const DmdOptions& options) {
+  const Index m = snapshots.size(), n = static_cast<Index>(snapshots.pixels());
   // The factor of the rows so far on top of the next block (sequential TSQR; Demmel, Grigori,
   // Hoemmen and Langou 2012): as stable as one factorization, in the memory of a block.
   const Index block = std::max<Index>(512, 2 * m);
   SnapshotFactor<double> factor;
   factor.r = QuaternionMatrixd(0, m);
   for (Index first = 0; first < n; first += block)
-    factor.r = qr(stacked(factor.r, window, first, std::min(block, n - first)), false).r;
+    factor.r = qr(stacked(factor.r, snapshots, first, std::min(block, n - first)), false).r;
   factor.tolerance = static_cast<double>(std::max(n, m)) * std::numeric_limits<double>::epsilon();
   factor.triangular = factor.r.rows() >= m - 1;
   for (Index k = 0; factor.triangular && k + 1 < m; ++k)

@@ -109,7 +109,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
   const ComplexVector<Real> eigenvalues = form.eigenvalues();
-  const auto chosen = select_background<Real>(eigenvalues, options.omega_threshold);
+  const auto chosen =
+      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes);
   const auto coefficients = projection.coefficients * form.q;
 
   // Step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.

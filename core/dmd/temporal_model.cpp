@@ -43,7 +43,14 @@ Eigen::MatrixXd TemporalModel::basis() const {
 }
 
 Eigen::MatrixXd TemporalModel::weights(double t) const {
-  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, picture_count());
+  Eigen::MatrixXd result;
+  weights(t, &result);
+  return result;
+}
+
+void TemporalModel::weights(double t, Eigen::MatrixXd* out) const {
+  Eigen::MatrixXd& weights = *out;
+  weights.setZero(3, picture_count());
   for (const Term& term : terms_) {
     const Quaterniond u = Quaterniond(power(term.lambda, t - term.reference_time)) * term.amplitude;
     if (term.channel < 0) {
@@ -57,7 +64,7 @@ Eigen::MatrixXd TemporalModel::weights(double t) const {
     }
   }
   static constexpr double kLargest = 1e30;
-  return weights.unaryExpr([](double v) { return std::clamp(v, -kLargest, kLargest); });
+  weights = weights.unaryExpr([](double v) { return std::clamp(v, -kLargest, kLargest); });
 }
 
 }  // namespace qdmd

@@ -33,6 +33,8 @@ class TemporalModel {
   Eigen::MatrixXd basis() const;
   // 3 x K, finite for every t: growth saturates far above the range of a picture.
   Eigen::MatrixXd weights(double t) const;
+  // The same into `weights`, which is resized where it has another size.
+  void weights(double t, Eigen::MatrixXd* weights) const;
 
  private:
   struct Term {

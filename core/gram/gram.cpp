@@ -45,29 +45,26 @@ SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
 }
 
 void SlidingGram::add_newest(const Window& window, int count, int span) {
-  if (span == 0) span = window.size();
-  add_slice(window, {window.size(), count, span}, 0, window.plane_size());
+  const SnapshotRange all(window);
+  add_slice(span == 0 ? all : all.newest(span), count, 0, window.plane_size());
 }
 
-void SlidingGram::add_slice(const Window& window, const SnapshotGroup& group, size_t first,
-                            size_t length) {
+void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
   planes_.clear();
-  for (int t = group.end - group.span; t < group.end; ++t)
-    for (int c = 0; c < kChannels; ++c) planes_.push_back(window.plane(window.slot(t), c));
+  for (int t = 0; t < span.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
   // Each snapshot needs those up to itself only: what comes after is the mirror image.
-  const int start = group.end - group.count;
-  for (int t = start; t < group.end; t += kRowSnapshots) {
-    const int end = std::min(t + kRowSnapshots, group.end);
-    const SnapshotGroup rows = {end, end - t, end - (group.end - group.span)};
-    multiply(rows, first, length);
-    store(window, rows, first == 0);
+  for (int start = span.size() - count; start < span.size(); start += kRowSnapshots) {
+    const int end = std::min(start + kRowSnapshots, span.size());
+    multiply(end - start, end, first, length);
+    store(span, start, end, first == 0);
   }
 }
 
 // Leaves the sums of the threads that took part.
-void SlidingGram::multiply(const SnapshotGroup& rows, size_t first, size_t length) {
-  const auto row_count = static_cast<size_t>(kChannels * rows.count);
-  const auto col_count = static_cast<size_t>(kChannels * rows.span);
+void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, size_t length) {
+  const auto row_count = static_cast<size_t>(kChannels * row_snapshots);
+  const auto col_count = static_cast<size_t>(kChannels * col_snapshots);
   const auto add = [&](size_t start, size_t end, size_t thread) {
     int64_t* sums = sums_.get() + thread * sums_size_;
     if (!has_sums_[thread]) std::fill_n(sums, row_count * col_count, int64_t{0});
@@ -90,18 +87,19 @@ void SlidingGram::multiply(const SnapshotGroup& rows, size_t first, size_t lengt
              [&](size_t part, size_t thread) { add(boundary(part), boundary(part + 1), thread); });
 }
 
-void SlidingGram::store(const Window& window, const SnapshotGroup& rows, bool fresh) {
-  const Eigen::Index col_count = kChannels * rows.span;
-  for (int k = 0; k < rows.count; ++k)
+// Snapshots start .. end - 1 of `span` were the rows, those up to end the columns.
+void SlidingGram::store(const SnapshotRange& span, int start, int end, bool fresh) {
+  const Eigen::Index col_count = kChannels * end;
+  for (int row = start; row < end; ++row)
     for (int c = 0; c < kChannels; ++c) {
-      auto column = by_slot_.col(kChannels * window.slot(rows.end - rows.count + k) + c);
+      auto column = by_slot_.col(kChannels * span.slot(row) + c);
       bool overwrite = fresh;
       for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
         if (!has_sums_[thread]) continue;
-        const int64_t* sums = sums_.get() + thread * sums_size_ + (kChannels * k + c) * col_count;
-        for (int t = 0; t < rows.span; ++t, sums += kChannels) {
-          auto products =
-              column.segment<kChannels>(kChannels * window.slot(rows.end - rows.span + t));
+        const int64_t* sums =
+            sums_.get() + thread * sums_size_ + (kChannels * (row - start) + c) * col_count;
+        for (int t = 0; t < end; ++t, sums += kChannels) {
+          auto products = column.segment<kChannels>(kChannels * span.slot(t));
           const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(sums);
           if (overwrite)
             products = sum;
@@ -113,13 +111,13 @@ void SlidingGram::store(const Window& window, const SnapshotGroup& rows, bool fr
     }
 }
 
-IntegerMatrix SlidingGram::matrix(const Window& window) const {
-  const int size = window.size();
+IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
+  const int size = snapshots.size();
   IntegerMatrix gram(kChannels * size, kChannels * size);
   for (int t = 0; t < size; ++t)
     for (int s = 0; s <= t; ++s) {
-      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * window.slot(s),
-                                                              kChannels * window.slot(t));
+      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * snapshots.slot(s),
+                                                              kChannels * snapshots.slot(t));
       gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block;
       gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block.transpose();
     }

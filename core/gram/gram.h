@@ -15,12 +15,6 @@ namespace qdmd {
 // 3m x 3m inner products of the window's planes; row 3 t + c is channel c of snapshot t.
 using IntegerMatrix = Eigen::Matrix<int64_t, Eigen::Dynamic, Eigen::Dynamic>;
 
-// Snapshots that enter the Gram matrix together, by their place in time: [end - count, end) of the
-// window, each with those of [end - span, end). count <= span <= end <= window.size().
-struct SnapshotGroup {
-  int end, count, span;
-};
-
 // Keeps the Gram matrix of a ring of snapshots. Integers only: adding and dropping snapshots for
 // ever gives the same bits as computing afresh. Not thread safe.
 class SlidingGram {
@@ -36,20 +30,19 @@ class SlidingGram {
   // the window from memory once. Elements of matrix() are valid for pairs that met in such a call.
   void add_newest(const Window& window, int count = 1, int span = 0);
 
-  // The part of such a call that pixels [first, first + length) of the planes contribute, of
-  // plane_size() pixels at most. The slice that begins at pixel 0 comes first and forgets the
-  // group's old products; the others follow in any order and size. The group's elements of matrix()
-  // are valid once its slices have covered every pixel once.
-  // Between slices, frames may be appended: the caller then lowers `end` by each that was dropped
-  // from a full window, and `span` by each dropped one that was part of it.
-  void add_slice(const Window& window, const SnapshotGroup& group, size_t first, size_t length);
+  // The inner products of the newest `count` snapshots of `span` with all of it, as far as pixels
+  // [first, first + length) of the planes contribute, of plane_size() pixels at most. The slice
+  // that begins at pixel 0 comes first and forgets the group's old products; the others follow in
+  // any order and size. The group's elements of matrix() are valid once its slices have covered
+  // every pixel once. Between slices, other frames may be appended.
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length);
 
   // The matrix in time order, 3 size x 3 size.
-  IntegerMatrix matrix(const Window& window) const;
+  IntegerMatrix matrix(const SnapshotRange& snapshots) const;
 
  private:
-  void multiply(const SnapshotGroup& rows, size_t first, size_t length);
-  void store(const Window& window, const SnapshotGroup& rows, bool fresh);
+  void multiply(int row_snapshots, int col_snapshots, size_t first, size_t length);
+  void store(const SnapshotRange& span, int start, int end, bool fresh);
 
   // Column 3 s + c has the products of slot s's channel c with the planes of its time and before.
   IntegerMatrix by_slot_;

@@ -52,4 +52,41 @@ class Window {
   std::unique_ptr<uint8_t[], Free> data_;
 };
 
+// Consecutive snapshots of a window, the oldest first. Names their slots, so that it stays right
+// while other snapshots are appended, until one of its own is dropped.
+class SnapshotRange {
+ public:
+  // All that the window holds.
+  SnapshotRange(const Window& window) : SnapshotRange(window, 0, window.size()) {}
+  // `count` snapshots from index `first` on.
+  SnapshotRange(const Window& window, int first, int count)
+      : window_(&window), first_slot_(count > 0 ? window.slot(first) : 0), size_(count) {}
+
+  int size() const { return size_; }
+  size_t pixels() const { return window_->pixels(); }
+  size_t plane_size() const { return window_->plane_size(); }
+  int slot(int index) const { return (first_slot_ + index) % window_->capacity(); }
+  const uint8_t* plane(int index, int channel) const {
+    return window_->plane(slot(index), channel);
+  }
+
+  // Its last `count` snapshots.
+  SnapshotRange newest(int count) const {
+    SnapshotRange range = *this;
+    range.first_slot_ = size_ > 0 ? slot(size_ - count) : 0;
+    range.size_ = count;
+    return range;
+  }
+  // The snapshots in the same slots of `window`, which has this one's capacity.
+  SnapshotRange in(const Window& window) const {
+    SnapshotRange range = *this;
+    range.window_ = &window;
+    return range;
+  }
+
+ private:
+  const Window* window_;
+  int first_slot_, size_;
+};
+
 }  // namespace qdmd

@@ -42,10 +42,10 @@ DmdOptions every_mode(double threshold) {
 // L at every pixel of a built model, three planes.
 std::vector<uint8_t> evaluate(const BackgroundModel& model, size_t pixels) {
   std::vector<uint8_t> out(3 * pixels);
-  for (size_t first = 0; first < pixels; first += BackgroundModel::kMaxRun) {
+  for (size_t first = 0; first < pixels; first += kMaxRun) {
     uint8_t* const rows[3] = {out.data() + first, out.data() + pixels + first,
                               out.data() + 2 * pixels + first};
-    model.evaluate(first, std::min(BackgroundModel::kMaxRun, pixels - first), rows);
+    model.evaluate(first, std::min(kMaxRun, pixels - first), rows);
   }
   return out;
 }
@@ -161,7 +161,7 @@ TemporalModel with_idle_modes(TemporalModel model, int snapshots) {
 TEST(BackgroundModel, PicturesAndDirectPathEqualTheDoubleEvaluation) {
   std::mt19937 rng(104);
   // More than two runs of pixels, and not a multiple.
-  const size_t pixels = 2 * BackgroundModel::kMaxRun + 77;
+  const size_t pixels = 2 * kMaxRun + 77;
   const std::vector<Clip> all = {noisy_clip(pixels, 24, 3, rng), noisy_clip(pixels, 24, 25, rng),
                                  colour_rotating_clip(pixels, 24, 0.25, 1, rng),
                                  drifting_clip(pixels, 24, 0.004, rng)};

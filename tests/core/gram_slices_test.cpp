@@ -1,5 +1,6 @@
 // The Gram matrix by any number of threads and in slices of pixels: the same bits.
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "core/gram/gram.h"
@@ -65,7 +66,7 @@ std::vector<Call> recorded(const Window& window, int threads, size_t first, size
   Pool pool(threads);
   SlidingGram gram(window.capacity(), &pool, kRecorder);
   calls.clear();
-  gram.add_slice(window, {window.size(), window.size(), window.size()}, first, length);
+  gram.add_slice(window, window.size(), first, length);
   std::sort(calls.begin(), calls.end(),
             [](const Call& a, const Call& b) { return a.first < b.first; });
   return calls;
@@ -110,8 +111,7 @@ TEST(SlidingGram, MoreSnapshotsAtOnceThanRowsOfAProduct) {
     SlidingGram gram(kFrames);
     // All but the newest `count`, which then come at once.
     if (count < kFrames)
-      gram.add_slice(window, {kFrames - count, kFrames - count, kFrames - count}, 0,
-                     window.plane_size());
+      gram.add_slice({window, 0, kFrames - count}, kFrames - count, 0, window.plane_size());
     gram.add_newest(window, count);
     EXPECT_EQ(gram.matrix(window), expected) << count << " at once";
   }
@@ -126,14 +126,13 @@ TEST(SlidingGramSlices, OfAnySizeGiveTheBitsOfOneCall) {
   const Window window = random_window(kFrames, kPixels, rng);
   const auto expected = gram_of(window);
   Pool pool(2);
-  const SnapshotGroup group = {kFrames, kFrames, kFrames};
   for (const Kernel& kernel : kernels())
     for (size_t size : {1u, 3u, 63u, 64u, 65u, 255u, 4095u, 4097u, 9'000u, 9'001u}) {
       if (size < 63 && std::string(kernel.name) == "reference") continue;
       SlidingGram gram(kFrames, &pool, kernel);
       for (int twice = 0; twice < 2; ++twice) {  // The first slice forgets what was there.
         for (size_t first = 0; first < kPixels; first += size)
-          gram.add_slice(window, group, first, std::min(size, kPixels - first));
+          gram.add_slice(window, kFrames, first, std::min(size, kPixels - first));
         ASSERT_EQ(gram.matrix(window), expected) << kernel.name << ", slices of " << size;
       }
     }
@@ -144,39 +143,33 @@ TEST(SlidingGramSlices, ComeInAnyOrderAfterTheFirst) {
   constexpr int kFrames = 4;
   const Window window = random_window(kFrames, 1000, rng);
   SlidingGram gram(kFrames);
-  const SnapshotGroup group = {kFrames, kFrames, kFrames};
-  gram.add_slice(window, group, 0, 101);
-  gram.add_slice(window, group, 700, window.plane_size() - 700);
-  gram.add_slice(window, group, 333, 367);
-  gram.add_slice(window, group, 101, 232);
+  gram.add_slice(window, kFrames, 0, 101);
+  gram.add_slice(window, kFrames, 700, window.plane_size() - 700);
+  gram.add_slice(window, kFrames, 333, 367);
+  gram.add_slice(window, kFrames, 101, 232);
   EXPECT_EQ(gram.matrix(window), gram_of(window));
 }
 
 // As live mode does it: a group's work is spread over the frames that follow it.
 TEST(SlidingGramSlices, OfAGroupWhileTheWindowSlides) {
   std::mt19937 rng(88);
-  constexpr int kCapacity = 7, kGroup = 3;
+  constexpr int kSpan = 5, kGroup = 3;
   constexpr size_t kPixels = 500, kSlice = 171;  // three slices
-  Window window(kCapacity, kPixels);
-  SlidingGram gram(kCapacity);
-  SnapshotGroup group = {0, 0, 0};
+  // Room for those that arrive before a group is complete.
+  Window window(kSpan + kGroup - 1, kPixels);
+  SlidingGram gram(window.capacity());
+  std::optional<SnapshotRange> span;
   for (int frame = 1; frame <= 40; ++frame) {
-    const bool drops = window.size() == kCapacity;
     append_frame(window, random_picture(kPixels, rng));
-    if (drops) {
-      // The span of these groups reaches back to the oldest snapshot.
-      --group.end;
-      --group.span;
-    }
-    if (frame % kGroup == 0) group = {window.size(), kGroup, window.size()};
-    if (group.count == 0) continue;
+    if (frame % kGroup == 0) span = SnapshotRange(window).newest(std::min(window.size(), kSpan));
+    if (!span) continue;
     const size_t first = kSlice * static_cast<size_t>(frame % kGroup);
-    gram.add_slice(window, group, first, std::min(kSlice, window.plane_size() - first));
+    gram.add_slice(*span, kGroup, first, std::min(kSlice, window.plane_size() - first));
     if (frame % kGroup < kGroup - 1) continue;
     // The group is complete; the newest two frames are in none yet.
-    const auto all = gram.matrix(window), expected = gram_of(window);
-    const Eigen::Index known = kChannels * group.end;
-    EXPECT_EQ(all.topLeftCorner(known, known), expected.topLeftCorner(known, known)) << frame;
+    const Eigen::Index known = kChannels * (window.size() - 2), size = kChannels * span->size();
+    EXPECT_EQ(gram.matrix(*span), gram_of(window).block(known - size, known - size, size, size))
+        << frame;
   }
 }
 
@@ -189,8 +182,7 @@ TEST(SlidingGramSlices, OfSeveralThreadsAndLargePictures) {
   SlidingGram whole(kFrames), sliced(kFrames, &pool);
   whole.add_newest(window, kFrames);
   for (size_t first = 0; first < kPixels; first += 49'999)
-    sliced.add_slice(window, {kFrames, kFrames, kFrames}, first,
-                     std::min<size_t>(49'999, kPixels - first));
+    sliced.add_slice(window, kFrames, first, std::min<size_t>(49'999, kPixels - first));
   EXPECT_EQ(sliced.matrix(window), whole.matrix(window));
 }
 

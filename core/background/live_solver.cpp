@@ -1,0 +1,80 @@
+#include "core/background/live_solver.h"
+
+#include <algorithm>
+
+namespace qdmd {
+
+void LiveSolver::restart(bool has_model) {
+  schedule_.restart(has_model ? schedule_.hop_size() : 1);
+}
+
+void LiveSolver::stop() {
+  try {
+    side_->finish();
+  } catch (...) {
+    // Nobody waits for the result.
+  }
+  group_.reset();
+  build_.reset();
+  finished_.reset();
+}
+
+bool LiveSolver::publish() {
+  if (!finished_) return false;
+  model_start_ = *finished_;
+  finished_.reset();
+  solver_->publish();
+  return true;
+}
+
+bool LiveSolver::settle() {
+  side_->finish();
+  return publish();
+}
+
+bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_once) {
+  const LiveSchedule::Step step = schedule_.next();
+  if (step.group > 0) {
+    // Frames that are kept for a solve in progress are no part of the window.
+    const int size = static_cast<int>(
+        std::min<int64_t>({schedule_.frames(), schedule_.window_size(), window.size()}));
+    group_ = Group{SnapshotRange(window).newest(size),
+                   step.group,
+                   step.gram_slices,
+                   0,
+                   step.solve,
+                   step.build_slices,
+                   schedule_.frames() - size};
+  }
+  if (!group_ && !build_) return false;
+  fixed_threshold_ = fixed_threshold;
+  if (!at_once) {
+    side_->start([this] { work(); });
+    return false;
+  }
+  while (group_ || build_) work();
+  return publish();
+}
+
+// One frame's share. Pictures come first: the solve after them needs their place.
+void LiveSolver::work() {
+  if (build_) {
+    solver_->build(build_->done, build_->slices);
+    if (++build_->done == build_->slices) {
+      solver_->finish(fixed_threshold_);
+      finished_ = build_->first_frame;
+      build_.reset();
+    }
+  }
+  if (group_) {
+    solver_->add_to_gram(group_->span, group_->frames, group_->done, group_->slices);
+    if (++group_->done < group_->slices) return;
+    if (group_->solve) {
+      solver_->decompose(group_->span);
+      build_ = Build{group_->build_slices, 0, group_->first_frame};
+    }
+    group_.reset();
+  }
+}
+
+}  // namespace qdmd

@@ -1,0 +1,66 @@
+// Runs a WindowSolver beside the frames of a live stream.
+#pragma once
+
+#include <optional>
+
+#include "core/background/live_schedule.h"
+#include "core/background/window_solver.h"
+#include "core/parallel/side_thread.h"
+
+namespace qdmd {
+
+// Before a frame enters the window: settle(). After that: start(). What LiveSchedule has for the
+// frame then runs on the side thread until the next settle(), or at once where it is little or
+// where there is no model yet. Models are therefore published at fixed frames.
+class LiveSolver {
+ public:
+  LiveSolver() = default;
+  // `solver` and `side` outlive this.
+  LiveSolver(const LiveSchedule& schedule, WindowSolver* solver, SideThread* side)
+      : schedule_(schedule), solver_(solver), side_(side) {}
+
+  // The next frame is the first of an empty window. The first solve comes with it, or, where
+  // `has_model`, after a hop: a model of many frames is better than one of few.
+  void restart(bool has_model);
+  // True: a model was published. Throws what the work threw.
+  bool settle();
+  // Begins the work that comes with the newest frame of `window`. `at_once`: ends it, too. True: a
+  // model was published. fixed_threshold: for the foreground's statistics.
+  bool start(const Window& window, double fixed_threshold, bool at_once);
+  // Drops the work that is under way.
+  void stop();
+
+  // The newest frame's time in the published model.
+  double time() const { return static_cast<double>(schedule_.frames() - 1 - model_start_); }
+  bool small() const { return schedule_.at_once(); }
+
+ private:
+  // A group of frames on its way into the Gram matrix.
+  struct Group {
+    SnapshotRange span;
+    int frames, slices, done = 0;
+    bool solve;
+    int build_slices;
+    int64_t first_frame;  // of the span, counted from restart()
+  };
+  // Pictures of modes in the making.
+  struct Build {
+    int slices, done = 0;
+    int64_t first_frame;
+  };
+
+  void work();
+  bool publish();
+
+  LiveSchedule schedule_;
+  WindowSolver* solver_ = nullptr;
+  SideThread* side_ = nullptr;
+  int64_t model_start_ = 0;  // the frame at time 0 of the published model, counted from restart()
+  // The side thread's between start() and settle().
+  std::optional<Group> group_;
+  std::optional<Build> build_;
+  std::optional<int64_t> finished_;  // first frame of a solve that waits to be published
+  double fixed_threshold_ = 0;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,102 @@
+#include "core/background/residual.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/background/residual.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Each function returns how many samples it did: as many as fill whole vectors.
+
+size_t differ(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out) {
+  const hn::ScalableTag<uint8_t> d;
+  size_t p = 0;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    const auto a = hn::LoadU(d, x + p), b = hn::LoadU(d, l + p);
+    hn::StoreU(hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)), d, out + p);
+  }
+  return p;
+}
+
+// White where the squared norm exceeds `limit`; sums saturate, so `limit` is below 65535.
+size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, uint16_t limit,
+              uint8_t* out) {
+  const hn::ScalableTag<uint16_t> d16;
+  const hn::RebindToSigned<decltype(d16)> d16s;
+  const hn::Rebind<uint8_t, decltype(d16)> d8;
+  const auto largest = hn::Set(d16, limit);
+  const auto square = [&](size_t c, size_t p) HWY_ATTR {
+    const auto a = hn::LoadU(d8, x[c] + p), b = hn::LoadU(d8, l[c] + p);
+    const auto distance =
+        hn::PromoteTo(d16, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
+    return hn::Mul(distance, distance);
+  };
+  size_t p = 0;
+  for (; p + hn::Lanes(d16) <= count; p += hn::Lanes(d16)) {
+    const auto sum = hn::SaturatedAdd(hn::SaturatedAdd(square(0, p), square(1, p)), square(2, p));
+    // 0xFFFF to 0x00FF: the samples' 255.
+    const auto white = hn::ShiftRight<8>(hn::VecFromMask(d16, hn::Gt(sum, largest)));
+    hn::StoreU(hn::DemoteTo(d8, hn::BitCast(d16s, white)), d8, out + p);
+  }
+  return p;
+}
+
+size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
+  const hn::ScalableTag<uint8_t> d;
+  size_t p = 0;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d))
+    hn::StoreU(hn::And(hn::LoadU(d, x + p), hn::LoadU(d, mask + p)), d, out + p);
+  return p;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+namespace {
+
+HWY_EXPORT(differ);
+HWY_EXPORT(exceed);
+HWY_EXPORT(mask_samples);
+
+}  // namespace
+
+void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out) {
+  for (size_t p = HWY_DYNAMIC_DISPATCH(differ)(x, l, count, out); p < count; ++p)
+    out[p] = static_cast<uint8_t>(std::abs(x[p] - l[p]));
+}
+
+void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
+                     double threshold, uint8_t* out) {
+  // Squared norms are integers.
+  const auto limit = static_cast<int>(std::min(std::floor(threshold * threshold), 1e6));
+  size_t p = 0;
+  if (limit < 65535)
+    p = HWY_DYNAMIC_DISPATCH(exceed)(x, l, count, static_cast<uint16_t>(limit), out);
+  for (; p < count; ++p) {
+    int sum = 0;
+    for (int c = 0; c < 3; ++c) sum += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+    out[p] = sum > limit ? 255 : 0;
+  }
+}
+
+void apply_mask(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
+  for (size_t p = HWY_DYNAMIC_DISPATCH(mask_samples)(x, mask, count, out); p < count; ++p)
+    out[p] = x[p] & mask[p];
+}
+
+}  // namespace qdmd
+#endif

@@ -1,0 +1,20 @@
+// What frames and background differ in, in one pass over bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace qdmd {
+
+// out[p] = |x[p] - l[p]|.
+void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out);
+
+// out[p] = 255 where the quaternion norm of x - l exceeds `threshold` (grey levels, >= 0; a norm is
+// at most 255 sqrt(3)), else 0. x, l: R, G, B.
+void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
+                     double threshold, uint8_t* out);
+
+// out[p] = x[p] where mask[p] is 255, 0 where it is 0.
+void apply_mask(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out);
+
+}  // namespace qdmd

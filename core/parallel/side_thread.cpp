@@ -1,0 +1,74 @@
+#include "core/parallel/side_thread.h"
+
+#include <system_error>
+#include <utility>
+
+namespace qdmd {
+
+SideThread::SideThread(bool active) {
+  if (!active) return;
+  try {
+    thread_ = std::thread([this] { loop(); });
+  } catch (const std::system_error&) {
+    // start() does the work itself.
+  }
+}
+
+SideThread::~SideThread() {
+  if (!thread_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void SideThread::run() noexcept {
+  try {
+    work_();
+  } catch (...) {
+    error_ = std::current_exception();
+  }
+}
+
+void SideThread::loop() noexcept {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return busy_ || stopping_; });
+    if (!busy_) return;
+    lock.unlock();
+    run();
+    lock.lock();
+    busy_ = false;
+    changed_.notify_all();
+  }
+}
+
+void SideThread::start(std::function<void()> work) {
+  work_ = std::move(work);
+  if (!thread_.joinable()) {
+    run();
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    busy_ = true;
+  }
+  changed_.notify_all();
+}
+
+bool SideThread::idle() {
+  const std::lock_guard lock(mutex_);
+  return !busy_;
+}
+
+void SideThread::finish() {
+  if (thread_.joinable()) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !busy_; });
+  }
+  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+}
+
+}  // namespace qdmd

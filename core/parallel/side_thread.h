@@ -1,0 +1,43 @@
+// One piece of work that goes on while its caller does something else.
+#pragma once
+
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace qdmd {
+
+// Runs one function at a time on a thread of its own, which sleeps between them. All calls come
+// from one thread.
+class SideThread {
+ public:
+  // `active` false, or a system that gives no more threads: start() runs its function itself.
+  explicit SideThread(bool active);
+  SideThread(const SideThread&) = delete;
+  SideThread& operator=(const SideThread&) = delete;
+  // Waits for the function that runs, whose exception is lost.
+  ~SideThread();
+
+  // Runs `work`; the one before must have been finished.
+  void start(std::function<void()> work);
+  // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
+  void finish();
+  // True where nothing runs.
+  bool idle();
+
+ private:
+  void loop() noexcept;
+  void run() noexcept;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // What the mutex guards; work_ and error_ belong to the thread while busy_.
+  bool busy_ = false, stopping_ = false;
+  std::function<void()> work_;
+  std::exception_ptr error_;
+  std::thread thread_;
+};
+
+}  // namespace qdmd
