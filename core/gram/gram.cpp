@@ -91,26 +91,25 @@ void SlidingGram::multiply(const SnapshotGroup& rows, size_t first, size_t lengt
 }
 
 void SlidingGram::store(const Window& window, const SnapshotGroup& rows, bool fresh) {
-  const Eigen::Index col_count = kChannels * rows.span;
-  for (int k = 0; k < rows.count; ++k)
-    for (int c = 0; c < kChannels; ++c) {
-      auto column = by_slot_.col(kChannels * window.slot(rows.end - rows.count + k) + c);
-      bool overwrite = fresh;
-      for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
-        if (!has_sums_[thread]) continue;
-        const int64_t* sums = sums_.get() + thread * sums_size_ + (kChannels * k + c) * col_count;
-        for (int t = 0; t < rows.span; ++t, sums += kChannels) {
+  const Eigen::Index row_count = kChannels * rows.count;
+  for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
+    if (!has_sums_[thread]) continue;
+    const int64_t* sums = sums_.get() + thread * sums_size_;
+    for (int t = 0; t < rows.span; ++t)
+      for (int c = 0; c < kChannels; ++c, sums += row_count) {
+        auto column = by_slot_.col(kChannels * window.slot(rows.end - rows.span + t) + c);
+        for (int k = 0; k < rows.count; ++k) {
           auto products =
-              column.segment<kChannels>(kChannels * window.slot(rows.end - rows.span + t));
-          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(sums);
-          if (overwrite)
+              column.segment<kChannels>(kChannels * window.slot(rows.end - rows.count + k));
+          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(sums + kChannels * k);
+          if (fresh)
             products = sum;
           else
             products += sum;
         }
-        overwrite = false;
       }
-    }
+    fresh = false;
+  }
 }
 
 IntegerMatrix SlidingGram::matrix(const Window& window) const {
@@ -118,10 +117,10 @@ IntegerMatrix SlidingGram::matrix(const Window& window) const {
   IntegerMatrix gram(kChannels * size, kChannels * size);
   for (int t = 0; t < size; ++t)
     for (int s = 0; s <= t; ++s) {
-      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * window.slot(s),
-                                                              kChannels * window.slot(t));
-      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block;
-      gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block.transpose();
+      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * window.slot(t),
+                                                              kChannels * window.slot(s));
+      gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block;
+      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block.transpose();
     }
   return gram;
 }
