@@ -89,26 +89,25 @@ void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, s
 
 // Snapshots start .. end - 1 of `span` were the rows, those up to end the columns.
 void SlidingGram::store(const SnapshotRange& span, int start, int end, bool fresh) {
-  const Eigen::Index col_count = kChannels * end;
-  for (int row = start; row < end; ++row)
-    for (int c = 0; c < kChannels; ++c) {
-      auto column = by_slot_.col(kChannels * span.slot(row) + c);
-      bool overwrite = fresh;
-      for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
-        if (!has_sums_[thread]) continue;
-        const int64_t* sums =
-            sums_.get() + thread * sums_size_ + (kChannels * (row - start) + c) * col_count;
-        for (int t = 0; t < end; ++t, sums += kChannels) {
-          auto products = column.segment<kChannels>(kChannels * span.slot(t));
-          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(sums);
-          if (overwrite)
+  const Eigen::Index row_count = kChannels * (end - start);
+  for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
+    if (!has_sums_[thread]) continue;
+    const int64_t* sums = sums_.get() + thread * sums_size_;
+    for (int t = 0; t < end; ++t)
+      for (int c = 0; c < kChannels; ++c, sums += row_count) {
+        auto column = by_slot_.col(kChannels * span.slot(t) + c);
+        for (int row = start; row < end; ++row) {
+          auto products = column.segment<kChannels>(kChannels * span.slot(row));
+          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(
+              sums + kChannels * (row - start));
+          if (fresh)
             products = sum;
           else
             products += sum;
         }
-        overwrite = false;
       }
-    }
+    fresh = false;
+  }
 }
 
 IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
@@ -116,10 +115,10 @@ IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
   IntegerMatrix gram(kChannels * size, kChannels * size);
   for (int t = 0; t < size; ++t)
     for (int s = 0; s <= t; ++s) {
-      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * snapshots.slot(s),
-                                                              kChannels * snapshots.slot(t));
-      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block;
-      gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block.transpose();
+      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * snapshots.slot(t),
+                                                              kChannels * snapshots.slot(s));
+      gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block;
+      gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block.transpose();
     }
   return gram;
 }

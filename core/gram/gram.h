@@ -44,12 +44,13 @@ class SlidingGram {
   void multiply(int row_snapshots, int col_snapshots, size_t first, size_t length);
   void store(const SnapshotRange& span, int start, int end, bool fresh);
 
-  // Column 3 s + c has the products of slot s's channel c with the planes of its time and before.
+  // Row 3 s + c has the products of slot s's channel c with the planes of its time and before.
   IntegerMatrix by_slot_;
   Pool* pool_ = nullptr;
   Kernel kernel_ = kernels().front();
   std::vector<const uint8_t*> planes_;  // of a call's span, in time order
-  // For each thread, its sums of a call: rows x columns. Not touched by threads that do nothing.
+  // For each thread, its sums of a call, row after row in each column. Not touched by threads that
+  // do nothing.
   std::unique_ptr<int64_t[]> sums_;
   std::vector<uint8_t> has_sums_;  // whether a thread took part
   size_t sums_size_ = 0;           // of one thread

@@ -44,7 +44,7 @@ void widened(const uint8_t* const* rows, size_t row_count, const uint8_t* const*
       for (size_t j = 0; j < col_count; ++j) {
         int32_t sums[kRows];
         block_dots(wide, cols[j] + start, count, sums);
-        for (size_t k = 0; k < group; ++k) out[(i + k) * col_count + j] += sums[k];
+        for (size_t k = 0; k < group; ++k) out[j * row_count + i + k] += sums[k];
       }
     }
   }
@@ -57,7 +57,7 @@ void reference(const uint8_t* const* rows, size_t row_count, const uint8_t* cons
     for (size_t j = 0; j < col_count; ++j) {
       int64_t sum = 0;
       for (size_t p = first; p < first + length; ++p) sum += int64_t{rows[i][p]} * cols[j][p];
-      out[i * col_count + j] += sum;
+      out[j * row_count + i] += sum;
     }
 }
 

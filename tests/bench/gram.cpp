@@ -1,10 +1,13 @@
-// The exact Gram matrix: kernels, windows, sizes and threads, in products per second, beside the
-// most that the dot-product instruction does when it touches registers alone.
+// The exact Gram matrix: kernels, windows, sizes, threads and slices, in products per second,
+// beside the most that the dot-product instruction does when it touches registers alone.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstring>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "core/gram/gram.h"
 
@@ -14,52 +17,83 @@ using namespace qdmd;
 
 constexpr int kGroup = 16;  // frames that the engine adds together
 
+double seconds() {
+  using namespace std::chrono;
+  return duration<double>(steady_clock::now().time_since_epoch()).count();
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// ---- The instruction alone ----
+
+constexpr int kRounds = 1 << 14;
+
 // In a register tile no product waits for the one before: so many chains.
 #define QDMD_TWELVE(x) x(0) x(1) x(2) x(3) x(4) x(5) x(6) x(7) x(8) x(9) x(10) x(11)
+#define QDMD_CLOBBERED \
+  "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", "xmm8", "xmm9", "xmm10", "xmm11"
+
+struct Peak {
+  const char* kernel;
+  double products;  // of a round
+  void (*run)();    // kRounds
+};
 
 #if defined(__x86_64__) && defined(__GNUC__)
-// 12 x 64 products a round.
-void peak_vnni(benchmark::State& state) {
-  if (!__builtin_cpu_supports("avx512vnni")) {
-    state.SkipWithError("this machine has no AVX-512 VNNI");
-    return;
-  }
-  constexpr int kRounds = 1 << 16;
-  for (auto _ : state)
-    for (int i = 0; i < kRounds; ++i)
-      asm volatile(
+constexpr Peak kPeaks[] = {
+    {"avx512-vnni", 12 * 64,
+     [] {
+       for (int i = 0; i < kRounds; ++i)
+         asm volatile(
 #define QDMD_DOT(n) "vpdpbusd %%zmm31, %%zmm30, %%zmm" #n "\n"
-          QDMD_TWELVE(QDMD_DOT)
+             QDMD_TWELVE(QDMD_DOT)
 #undef QDMD_DOT
-              ::
-                  : "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", "xmm8", "xmm9",
-                    "xmm10", "xmm11");
-  state.counters["GMAC/s"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * kRounds * 12 * 64 / 1e9,
-                         benchmark::Counter::kIsRate);
+                 ::
+                     : QDMD_CLOBBERED);
+     }},
+    {"avx-vnni", 12 * 32,
+     [] {
+       for (int i = 0; i < kRounds; ++i)
+         asm volatile(
+#define QDMD_DOT(n) "%{vex%} vpdpbusd %%ymm15, %%ymm14, %%ymm" #n "\n"
+             QDMD_TWELVE(QDMD_DOT)
+#undef QDMD_DOT
+                 ::
+                     : QDMD_CLOBBERED);
+     }},
+    {"avx2", 12 * 16,  // factors of 16 bits
+     [] {
+       for (int i = 0; i < kRounds; ++i)
+         asm volatile(
+#define QDMD_DOT(n) "vpmaddwd %%ymm15, %%ymm14, %%ymm13\nvpaddd %%ymm13, %%ymm" #n ", %%ymm" #n "\n"
+             QDMD_TWELVE(QDMD_DOT)
+#undef QDMD_DOT
+                 ::
+                     : QDMD_CLOBBERED, "xmm13");
+     }},
+};
+#else
+constexpr Peak kPeaks[] = {{"none", 0, [] {}}};
+#endif
+
+// Null where nobody wrote a loop for the kernel.
+const Peak* peak_of(const Kernel& kernel) {
+  for (const Peak& peak : kPeaks)
+    if (std::string(peak.kernel) == kernel.name) return &peak;
+  return nullptr;
 }
 
-// 12 x 16 products of 16 bits a round.
-void peak_avx2(benchmark::State& state) {
-  if (!__builtin_cpu_supports("avx2")) {
-    state.SkipWithError("this machine has no AVX2");
-    return;
-  }
-  constexpr int kRounds = 1 << 16;
-  for (auto _ : state)
-    for (int i = 0; i < kRounds; ++i)
-      asm volatile(
-#define QDMD_DOT(n) "vpmaddwd %%ymm15, %%ymm14, %%ymm13\nvpaddd %%ymm13, %%ymm" #n ", %%ymm" #n "\n"
-          QDMD_TWELVE(QDMD_DOT)
-#undef QDMD_DOT
-              ::
-                  : "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", "xmm8", "xmm9",
-                    "xmm10", "xmm11", "xmm13");
-  state.counters["GMAC/s"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * kRounds * 12 * 16 / 1e9,
-                         benchmark::Counter::kIsRate);
+double peak_gmacs(const Peak& peak) {
+  const double start = seconds();
+  peak.run();
+  return kRounds * peak.products / 1e9 / (seconds() - start);
 }
-#endif
+
+// ---- Windows ----
 
 Window random_window(int frames, size_t pixels) {
   Window window(frames, pixels);
@@ -67,61 +101,81 @@ Window random_window(int frames, size_t pixels) {
   for (int t = 0; t < frames; ++t) {
     const int slot = window.append();
     for (int c = 0; c < kChannels; ++c)
-      std::generate_n(window.plane(slot, c), pixels, [&] { return static_cast<uint8_t>(rng()); });
+      for (size_t p = 0; p < pixels; p += 8) {
+        const uint64_t samples = rng();
+        std::memcpy(window.plane(slot, c) + p, &samples, std::min<size_t>(8, pixels - p));
+      }
   }
   return window;
 }
 
-// A whole window as the engine adds it: 3m (3m + 1) / 2 products a pixel are asked for.
-void window_gram(benchmark::State& state, const Kernel& kernel) {
-  const auto frames = static_cast<int>(state.range(0)), threads = static_cast<int>(state.range(3));
-  const auto pixels = static_cast<size_t>(state.range(1)) * static_cast<size_t>(state.range(2));
-  const Window full = random_window(frames, pixels);
-  Window window(frames, pixels);
-  Pool pool(threads);
-  SlidingGram gram(frames, &pool, kernel);
+struct Case {
+  int frames, width, height, threads;
+  int slices = 1;  // calls for each group of frames, as live mode spreads them
+};
+
+// A whole window as the engine adds it: 3m (3m + 1) / 2 products a pixel are asked for. Medians,
+// with the peak measured in turn, because others may use the machine.
+void window_gram(benchmark::State& state, const Kernel& kernel, const Case& c) {
+  const auto pixels = static_cast<size_t>(c.width) * static_cast<size_t>(c.height);
+  const Window window = random_window(c.frames, pixels);
+  const double gigaproducts = 1.5 * c.frames * (3.0 * c.frames + 1) * double(pixels) / 1e9;
+  Pool pool(c.threads);
+  SlidingGram gram(c.frames, &pool, kernel);
+  const Peak* peak = peak_of(kernel);
+  const size_t slice = (window.plane_size() + size_t(c.slices) - 1) / size_t(c.slices);
+  std::vector<double> rates, fractions;
   for (auto _ : state) {
-    window.clear();
-    for (int t = 0; t < frames; ++t) {
-      state.PauseTiming();
-      const int slot = window.append();
-      for (int c = 0; c < kChannels; ++c)
-        std::copy_n(full.plane(t, c), full.plane_size(), window.plane(slot, c));
-      state.ResumeTiming();
-      if (window.size() % kGroup == 0 || window.size() == frames)
-        gram.add_newest(window, (window.size() - 1) % kGroup + 1);
+    const double most = peak ? peak_gmacs(*peak) * c.threads : 0;
+    const double start = seconds();
+    for (int first = 0; first < c.frames; first += kGroup) {
+      const int end = std::min(first + kGroup, c.frames);
+      for (size_t p = 0; p < window.plane_size(); p += slice)
+        gram.add_slice({window, 0, end}, end - first, p, std::min(slice, window.plane_size() - p));
     }
+    const double took = seconds() - start;
+    state.SetIterationTime(took);
+    rates.push_back(gigaproducts / took);
+    if (peak) fractions.push_back(rates.back() / most);
   }
-  const double products = 1.5 * frames * (3.0 * frames + 1) * static_cast<double>(pixels);
-  state.counters["GMAC/s"] = benchmark::Counter(
-      static_cast<double>(state.iterations()) * products / 1e9, benchmark::Counter::kIsRate);
+  state.counters["GMAC/s"] = median(rates);
+  if (peak) state.counters["of_peak"] = median(fractions);
 }
 
-void register_window(const Kernel& kernel, std::initializer_list<int64_t> arguments) {
-  benchmark::RegisterBenchmark(("window/" + std::string(kernel.name)).c_str(),
-                               [kernel](benchmark::State& state) { window_gram(state, kernel); })
-      ->ArgNames({"m", "width", "height", "threads"})
-      ->Args(arguments)
+void register_window(const Kernel& kernel, const Case& c) {
+  std::string name = std::string(kernel.name) + "/m:" + std::to_string(c.frames) + "/" +
+                     std::to_string(c.width) + "x" + std::to_string(c.height) +
+                     "/threads:" + std::to_string(c.threads);
+  if (c.slices > 1) name += "/slices:" + std::to_string(c.slices);
+  benchmark::RegisterBenchmark(
+      name.c_str(), [kernel, c](benchmark::State& state) { window_gram(state, kernel, c); })
       ->Unit(benchmark::kMillisecond)
-      ->UseRealTime();
+      ->UseManualTime();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-#if defined(__x86_64__) && defined(__GNUC__)
-  benchmark::RegisterBenchmark("peak/avx512-vnni", peak_vnni);
-  benchmark::RegisterBenchmark("peak/avx2", peak_avx2);
-#endif
   for (const Kernel& kernel : kernels()) {
+    if (const Peak* peak = peak_of(kernel))
+      benchmark::RegisterBenchmark((std::string("peak/") + kernel.name).c_str(),
+                                   [peak](benchmark::State& state) {
+                                     std::vector<double> rates;
+                                     for (auto _ : state) rates.push_back(peak_gmacs(*peak));
+                                     state.counters["GMAC/s"] = median(rates);
+                                   });
     register_window(kernel, {25, 320, 240, 1});
     // The plain loop takes seconds for more.
     if (std::string(kernel.name) == "reference") continue;
-    register_window(kernel, {100, 320, 240, 1});
-    register_window(kernel, {200, 320, 240, 1});
-    register_window(kernel, {200, 320, 240, 2});
-    register_window(kernel, {50, 768, 576, 1});
-    register_window(kernel, {20, 1920, 1080, 1});
+    for (int threads : {1, 2}) {
+      for (int frames : {100, 200}) {
+        register_window(kernel, {frames, 320, 240, threads});
+        register_window(kernel, {frames, 768, 576, threads});
+      }
+      register_window(kernel, {60, 1920, 1080, threads});
+    }
+    register_window(kernel, {100, 320, 240, 1, kGroup});
+    register_window(kernel, {100, 1920, 1080, 1, kGroup});
   }
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;

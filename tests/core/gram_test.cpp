@@ -29,7 +29,7 @@ void expect_exact(const Planes& rows, const Planes& cols, size_t length) {
                             length, out.data());
     for (size_t i = 0; i < rows.size(); ++i)
       for (size_t j = 0; j < cols.size(); ++j)
-        EXPECT_EQ(out[i * cols.size() + j] + 12345, naive_dot(rows[i], cols[j]))
+        EXPECT_EQ(out[j * rows.size() + i] + 12345, naive_dot(rows[i], cols[j]))
             << kernel.name << " length " << length << " row " << i << " col " << j;
     EXPECT_EQ(out.back(), -12345) << kernel.name;
   }
