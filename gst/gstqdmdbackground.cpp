@@ -35,9 +35,11 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <utility>
 
 #include "core/background/engine.h"
 #include "gst/gstqdmdenums.h"
+#include "gst/gstqdmdsettings.h"
 #include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
@@ -46,21 +48,17 @@ GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
 namespace {
 
 using qdmd::Engine;
-using qdmd::EngineOptions;
 using qdmd::MappedVideoFrame;
 using qdmd::Output;
+using qdmd::Settings;
 using qdmd::Status;
 
 // The latency of video without a frame rate is that of this rate.
 constexpr int kAssumedRate = 25;
 
-#define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
+constexpr guint kStatsProperty = qdmd::kFirstFreeProperty;
 
-struct Settings {
-  Output output = Output::background;
-  GstQdmdBackgroundMode mode = GST_QDMD_BACKGROUND_MODE_BATCH;
-  EngineOptions engine;
-};
+#define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
 
 struct UnrefBuffer {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
@@ -72,6 +70,7 @@ struct Private {
   Settings settings;
   GstClockTime latency = 0;
   guint64 frames_in = 0, frames_out = 0, solves = 0;
+  bool reset_asked = false;
   qdmd::SolveReport report;
 
   // Protected by the stream lock.
@@ -96,22 +95,6 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
                             GST_TYPE_QDMD_BACKGROUND)
 
 // ---- Properties ---------------------------------------------------------------------------------
-
-enum {
-  PROP_0,
-  PROP_OUTPUT,
-  PROP_MODE,
-  PROP_WINDOW_SIZE,
-  PROP_METHOD,
-  PROP_RANK,
-  PROP_OMEGA_THRESHOLD,
-  PROP_AMPLITUDE,
-  PROP_SOLVER,
-  PROP_FOREGROUND_THRESHOLD,
-  PROP_MAX_MEMORY,
-  PROP_N_THREADS,
-  PROP_STATS
-};
 
 static GstStructure* make_stats(const Private* priv) {
   const auto& report = priv->report;
@@ -142,95 +125,22 @@ static void gst_qdmd_background_set_property(GObject* object, guint id, const GV
                                              GParamSpec* spec) {
   Private* priv = GST_QDMD_BACKGROUND(object)->priv;
   GST_OBJECT_LOCK(object);
-  Settings& settings = priv->settings;
-  switch (id) {
-    case PROP_OUTPUT:
-      settings.output = Output(g_value_get_enum(value));
-      break;
-    case PROP_MODE:
-      settings.mode = GstQdmdBackgroundMode(g_value_get_enum(value));
-      break;
-    case PROP_WINDOW_SIZE:
-      settings.engine.window_size = int(g_value_get_uint(value));
-      break;
-    case PROP_METHOD:
-      settings.engine.dmd.method = qdmd::Method(g_value_get_enum(value));
-      break;
-    case PROP_RANK:
-      settings.engine.dmd.rank = int(g_value_get_uint(value));
-      break;
-    case PROP_OMEGA_THRESHOLD:
-      settings.engine.dmd.omega_threshold = g_value_get_double(value);
-      break;
-    case PROP_AMPLITUDE:
-      settings.engine.dmd.amplitude = qdmd::Amplitude(g_value_get_enum(value));
-      break;
-    case PROP_SOLVER:
-      settings.engine.dmd.solver = qdmd::Solver(g_value_get_enum(value));
-      break;
-    case PROP_FOREGROUND_THRESHOLD:
-      settings.engine.foreground_threshold = g_value_get_double(value);
-      break;
-    case PROP_MAX_MEMORY:
-      settings.engine.max_memory = g_value_get_uint64(value);
-      break;
-    case PROP_N_THREADS:
-      settings.engine.threads = int(g_value_get_uint(value));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
+  const bool known = qdmd::set_setting(&priv->settings, id, value);
   GST_OBJECT_UNLOCK(object);
+  if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* value,
                                              GParamSpec* spec) {
   Private* priv = GST_QDMD_BACKGROUND(object)->priv;
   GST_OBJECT_LOCK(object);
-  const Settings& settings = priv->settings;
-  switch (id) {
-    case PROP_OUTPUT:
-      g_value_set_enum(value, gint(settings.output));
-      break;
-    case PROP_MODE:
-      g_value_set_enum(value, gint(settings.mode));
-      break;
-    case PROP_WINDOW_SIZE:
-      g_value_set_uint(value, guint(settings.engine.window_size));
-      break;
-    case PROP_METHOD:
-      g_value_set_enum(value, gint(settings.engine.dmd.method));
-      break;
-    case PROP_RANK:
-      g_value_set_uint(value, guint(settings.engine.dmd.rank));
-      break;
-    case PROP_OMEGA_THRESHOLD:
-      g_value_set_double(value, settings.engine.dmd.omega_threshold);
-      break;
-    case PROP_AMPLITUDE:
-      g_value_set_enum(value, gint(settings.engine.dmd.amplitude));
-      break;
-    case PROP_SOLVER:
-      g_value_set_enum(value, gint(settings.engine.dmd.solver));
-      break;
-    case PROP_FOREGROUND_THRESHOLD:
-      g_value_set_double(value, settings.engine.foreground_threshold);
-      break;
-    case PROP_MAX_MEMORY:
-      g_value_set_uint64(value, settings.engine.max_memory);
-      break;
-    case PROP_N_THREADS:
-      g_value_set_uint(value, guint(settings.engine.threads));
-      break;
-    case PROP_STATS:
-      g_value_take_boxed(value, make_stats(priv));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
+  bool known = qdmd::get_setting(priv->settings, id, value);
+  if (id == kStatsProperty) {
+    g_value_take_boxed(value, make_stats(priv));
+    known = true;
   }
   GST_OBJECT_UNLOCK(object);
+  if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 // ---- Frames through the engine ------------------------------------------------------------------
@@ -322,15 +232,11 @@ static GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   return GST_FLOW_OK;
 }
 
-// Solves for what is left and pushes it. The caller holds the stream lock: sink events that are
-// serialized, and the streaming thread.
+// Solves for what is left and pushes it; the next frame begins a new window. The caller holds the
+// stream lock: sink events that are serialized, and the streaming thread.
 static GstFlowReturn drain(GstQdmdBackground* self) {
   Private* priv = self->priv;
-  if (priv->shells.empty()) {
-    // Nothing waits, but the next frame must not join a window that has ended.
-    drop_frames(self);
-    return GST_FLOW_OK;
-  }
+  if (!priv->engine.configured()) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(priv->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
   if (!guarded(self, [&] { return priv->engine.drain(); })) flow = GST_FLOW_ERROR;
@@ -340,9 +246,9 @@ static GstFlowReturn drain(GstQdmdBackground* self) {
     if (flow == GST_FLOW_OK && buffer)
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
   }
-  if (flow != GST_FLOW_OK)
-    GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(priv->shells.size()),
-                     gst_flow_get_name(flow));
+  if (flow == GST_FLOW_OK) return flow;
+  GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(priv->shells.size()),
+                   gst_flow_get_name(flow));
   drop_frames(self);
   return flow;
 }
@@ -352,15 +258,20 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
                                                              GstBuffer* input) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
   Private* priv = self->priv;
+  GST_OBJECT_LOCK(self);
+  const bool reset = std::exchange(priv->reset_asked, false);
+  const bool freeze = priv->settings.freeze;
+  GST_OBJECT_UNLOCK(self);
   // The base class keeps is_discont set until something was pushed, which can be a window later:
   // the buffer's own flag says where time breaks.
-  if (GST_BUFFER_IS_DISCONT(input)) {
+  if (GST_BUFFER_IS_DISCONT(input) || reset) {
     const GstFlowReturn flow = drain(self);
     if (flow != GST_FLOW_OK) {
       gst_buffer_unref(input);
       return flow;
     }
   }
+  if (reset) drop_frames(self);
 
   // The parent renegotiates where that is due and leaves the buffer in queued_buf.
   const GstFlowReturn flow =
@@ -387,6 +298,7 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
     }
     const bool taken = guarded(self, [&] {
       priv->shells.push_back(std::move(shell));
+      priv->engine.set_freeze(freeze);
       return priv->engine.push(frame.view<const uint8_t>());
     });
     if (!taken) {
@@ -430,8 +342,9 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, G
   const bool has_rate = GST_VIDEO_INFO_FPS_N(in) > 0 && GST_VIDEO_INFO_FPS_D(in) > 0;
   const guint64 rate_n = has_rate ? guint64(GST_VIDEO_INFO_FPS_N(in)) : kAssumedRate;
   const guint64 rate_d = has_rate ? guint64(GST_VIDEO_INFO_FPS_D(in)) : 1;
-  const GstClockTime latency =
-      gst_util_uint64_scale(guint64(settings.engine.window_size - 1) * GST_SECOND, rate_d, rate_n);
+  const guint64 delay =
+      settings.engine.mode == qdmd::Mode::live ? 0 : guint64(settings.engine.window_size - 1);
+  const GstClockTime latency = gst_util_uint64_scale(delay * GST_SECOND, rate_d, rate_n);
   GST_OBJECT_LOCK(self);
   const bool changed = latency != priv->latency;
   priv->latency = latency;
@@ -457,6 +370,10 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
       break;
     }
     case GST_EVENT_STREAM_START:
+      // Another stream, another scene.
+      drain(self);
+      drop_frames(self);
+      break;
     case GST_EVENT_SEGMENT:
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_GAP:
@@ -517,8 +434,7 @@ static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
 static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
   drop_frames(self);
-  // An empty engine gives the window's memory back.
-  self->priv->engine = Engine();
+  self->priv->engine.close();
   return TRUE;
 }
 
@@ -535,73 +451,10 @@ static void gst_qdmd_background_init(GstQdmdBackground* self) {
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 
-static void install_properties(GObjectClass* object_class) {
-  const auto at_start =
-      GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-  const auto any_time =
-      GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-  const auto install = [&](guint id, GParamSpec* spec) {
-    g_object_class_install_property(object_class, id, spec);
-  };
-  const Settings defaults;
-  const auto& engine = defaults.engine;
-
-  install(PROP_OUTPUT, g_param_spec_enum(
-                           "output", "Output", "What is sent on in place of each frame",
-                           gst_qdmd_background_output_get_type(), gint(defaults.output), any_time));
-  install(PROP_MODE,
-          g_param_spec_enum("mode", "Mode", "When a model is computed and for which frames",
-                            gst_qdmd_background_mode_get_type(), gint(defaults.mode), at_start));
-  install(PROP_WINDOW_SIZE,
-          g_param_spec_uint("window-size", "Window size",
-                            "Frames that are decomposed together; more frames separate slow "
-                            "movers better and cost latency, memory (3 bytes per pixel and frame) "
-                            "and time",
-                            guint(EngineOptions::kMinWindow), guint(EngineOptions::kMaxWindow),
-                            guint(engine.window_size), at_start));
-  install(PROP_METHOD, g_param_spec_enum("method", "Method", "How a window is decomposed",
-                                         gst_qdmd_background_method_get_type(),
-                                         gint(engine.dmd.method), at_start));
-  install(PROP_RANK,
-          g_param_spec_uint("rank", "Rank",
-                            "Singular values that the decomposition keeps (0: all); rank 1 is the "
-                            "steadiest where people stand still",
-                            0, guint(EngineOptions::kMaxWindow), guint(engine.dmd.rank), at_start));
-  install(PROP_OMEGA_THRESHOLD,
-          g_param_spec_double("omega-threshold", "Omega threshold",
-                              "Modes whose frequency and growth, abs(omega) in rad/frame, are at "
-                              "most this are background (0: only the one nearest zero)",
-                              0, G_MAXDOUBLE, engine.dmd.omega_threshold, at_start));
-  install(PROP_AMPLITUDE, g_param_spec_enum("amplitude", "Amplitude",
-                                            "Which frames decide how strong the background mode is",
-                                            gst_qdmd_background_amplitude_get_type(),
-                                            gint(engine.dmd.amplitude), at_start));
-  install(
-      PROP_SOLVER,
-      g_param_spec_enum("solver", "Solver", "How method=qdmd is computed; same picture, other cost",
-                        gst_qdmd_background_solver_get_type(), gint(engine.dmd.solver), at_start));
-  install(PROP_FOREGROUND_THRESHOLD,
-          g_param_spec_double("foreground-threshold", "Foreground threshold",
-                              "Distance from the background, the length of the RGB difference in "
-                              "grey levels, above which a pixel is foreground (0: from the noise "
-                              "of the window, at least 18)",
-                              0, 442, engine.foreground_threshold, any_time));
-  install(PROP_MAX_MEMORY,
-          g_param_spec_uint64("max-memory", "Maximum memory",
-                              "Bytes that the window may take; a larger one is an error", 0,
-                              G_MAXUINT64, engine.max_memory, at_start));
-  install(PROP_N_THREADS,
-          g_param_spec_uint("n-threads", "Number of threads",
-                            "Threads that compute the Gram matrix (0: one for each core); the "
-                            "pictures are the same for any number",
-                            0, guint(EngineOptions::kMaxThreads), guint(engine.threads), at_start));
-  install(PROP_STATS,
-          g_param_spec_boxed("stats", "Statistics",
-                             "Counters, and facts about the newest solve: rank, lambda (real and "
-                             "imaginary part), omega in rad/frame, residual, condition, "
-                             "foreground-ratio (0 to 1), gram-time and solve-time in seconds",
-                             GST_TYPE_STRUCTURE,
-                             GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+static void gst_qdmd_background_reset(GstQdmdBackground* self) {
+  GST_OBJECT_LOCK(self);
+  self->priv->reset_asked = true;
+  GST_OBJECT_UNLOCK(self);
 }
 
 static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
@@ -613,7 +466,24 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
   object_class->set_property = gst_qdmd_background_set_property;
   object_class->get_property = gst_qdmd_background_get_property;
   object_class->finalize = gst_qdmd_background_finalize;
-  install_properties(object_class);
+  qdmd::install_settings(object_class);
+  g_object_class_install_property(
+      object_class, kStatsProperty,
+      g_param_spec_boxed("stats", "Statistics",
+                         "Counters, and facts about the newest solve: rank, lambda (real and "
+                         "imaginary part), omega in rad/frame, residual, condition, "
+                         "foreground-ratio (0 to 1), gram-time and solve-time in seconds",
+                         GST_TYPE_STRUCTURE,
+                         GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  /**
+   * GstQdmdBackground::reset:
+   *
+   * Forgets the background. What waits in a batch is sent first; learning begins anew with the next
+   * frame, in any state and from any thread.
+   */
+  g_signal_new_class_handler(
+      "reset", G_TYPE_FROM_CLASS(klass), GSignalFlags(G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
+      G_CALLBACK(gst_qdmd_background_reset), nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
 
   gst_element_class_set_static_metadata(
       element_class, "Q-DMD background separator", "Filter/Effect/Video",

@@ -1,7 +1,7 @@
 #include "gst/gstqdmdenums.h"
 
+#include "core/background/engine_options.h"
 #include "core/background/foreground.h"
-#include "core/dmd/options.h"
 
 using qdmd::Output;
 
@@ -19,10 +19,14 @@ GType gst_qdmd_background_output_get_type() {
 
 GType gst_qdmd_background_mode_get_type() {
   static const GEnumValue values[] = {
-      {GST_QDMD_BACKGROUND_MODE_BATCH,
+      {int(qdmd::Mode::batch),
        "Fill a window, solve, send its frames, each with its own L(t); a latency of "
        "window-size - 1 frames",
        "batch"},
+      {int(qdmd::Mode::live),
+       "Send each frame at once, against the newest model; solve every hop-size frames on the last "
+       "window-size ones",
+       "live"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundMode", values);
   return type;

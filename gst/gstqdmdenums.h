@@ -3,12 +3,10 @@
 
 #include <gst/gst.h>
 
-// Values of `output`, `method`, `amplitude` and `solver` are those of the core's enumerations.
+// Values of `output`, `mode`, `method`, `amplitude` and `solver` are those of the core's
+// enumerations.
 GType gst_qdmd_background_output_get_type();
 GType gst_qdmd_background_method_get_type();
 GType gst_qdmd_background_amplitude_get_type();
 GType gst_qdmd_background_solver_get_type();
-
-// When a model is computed, and for which frames.
-enum GstQdmdBackgroundMode { GST_QDMD_BACKGROUND_MODE_BATCH };
 GType gst_qdmd_background_mode_get_type();

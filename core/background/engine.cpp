@@ -42,16 +42,13 @@ void for_bands(Pool& pool, int width, int height, Pass pass) {
 Status Engine::configure(const EngineOptions& options, int width, int height) {
   const Status status = check_options(options, width, height);
   if (!status.ok()) return status;
-  if (side_) live_.stop();
+  // The old window goes first: two at once would break the promise of max-memory.
+  close();
   const EngineLayout layout = layout_of(options, width, height);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   options_ = options;
   width_ = width;
   height_ = height;
-  // The old window goes first: two at once would break the promise of max-memory.
-  window_ = Window();
-  solver_ = WindowSolver();
-  window_ = Window(layout.capacity, pixels);
   const int threads = thread_count(options);
   pool_ = std::make_unique<Pool>(threads);
   side_ = std::make_unique<SideThread>(threads > 1);
@@ -64,9 +61,19 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   live_ = LiveSolver(LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels)),
                      &solver_, side_.get());
   alpha_ = AlphaStore(layout.capacity);
-  solves_ = 0;
-  flush();
+  window_ = Window(layout.capacity, pixels);
   return {};
+}
+
+void Engine::close() {
+  flush();
+  window_ = Window();
+  alpha_ = AlphaStore();
+  solver_ = WindowSolver();
+  live_ = LiveSolver();
+  side_.reset();
+  pool_.reset();
+  solves_ = 0;
 }
 
 void Engine::flush() {
@@ -92,7 +99,7 @@ void Engine::take_in(const ImageView& frame) {
 }
 
 Status Engine::push(const ImageView& frame) {
-  if (window_.capacity() == 0)
+  if (!configured())
     return {Status::Code::not_configured, "configure the engine before pushing frames"};
   if (ready_ > 0)
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
@@ -190,7 +197,7 @@ void Engine::push_live(const ImageView& frame) {
 }
 
 Status Engine::drain() {
-  if (window_.capacity() == 0)
+  if (!configured())
     return {Status::Code::not_configured, "configure the engine before draining it"};
   if (options_.mode == Mode::batch && pending_ > ready_) solve();
   start_new_window_ = true;

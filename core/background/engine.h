@@ -20,8 +20,15 @@ namespace qdmd {
 // do not depend on the number of threads or on time. Not thread safe. May throw std::bad_alloc.
 class Engine {
  public:
+  Engine() = default;
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
   // Starts afresh with frames of width x height pixels.
   Status configure(const EngineOptions& options, int width, int height);
+  bool configured() const { return window_.capacity() > 0; }
+  // Gives all memory and threads back; configure() comes next.
+  void close();
 
   // Copies a frame in. Batch: solves when the window is full.
   Status push(const ImageView& frame);

@@ -1,0 +1,157 @@
+#include "gst/gstqdmdsettings.h"
+
+#include <iterator>
+
+#include "gst/gstqdmdenums.h"
+
+namespace qdmd {
+namespace {
+
+constexpr auto kAtStart =
+    GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+constexpr auto kAnyTime =
+    GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+struct Property {
+  GParamSpec* (*spec)(const Settings& defaults);
+  void (*set)(Settings& settings, const GValue* value);
+  void (*get)(const Settings& settings, GValue* value);
+};
+
+// Access to one member, given as an lvalue in terms of `s`.
+#define QDMD_ENUM(member)                                                               \
+  [](Settings& s, const GValue* v) { member = decltype(member)(g_value_get_enum(v)); }, \
+      [](const Settings& s, GValue* v) { g_value_set_enum(v, gint(member)); }
+#define QDMD_UINT(member)                                                  \
+  [](Settings& s, const GValue* v) { member = int(g_value_get_uint(v)); }, \
+      [](const Settings& s, GValue* v) { g_value_set_uint(v, guint(member)); }
+#define QDMD_DOUBLE(member)                                             \
+  [](Settings& s, const GValue* v) { member = g_value_get_double(v); }, \
+      [](const Settings& s, GValue* v) { g_value_set_double(v, member); }
+
+const Property kProperties[] = {
+    {[](const Settings& d) {
+       return g_param_spec_enum("output", "Output", "What is sent on in place of each frame",
+                                gst_qdmd_background_output_get_type(), gint(d.output), kAnyTime);
+     },
+     QDMD_ENUM(s.output)},
+    {[](const Settings& d) {
+       return g_param_spec_enum("mode", "Mode", "When a model is computed and for which frames",
+                                gst_qdmd_background_mode_get_type(), gint(d.engine.mode), kAtStart);
+     },
+     QDMD_ENUM(s.engine.mode)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("window-size", "Window size",
+                                "Frames that are decomposed together; more frames separate slow "
+                                "movers better and cost memory (3 bytes per pixel and frame), time "
+                                "and, in mode=batch, latency",
+                                guint(EngineOptions::kMinWindow), guint(EngineOptions::kMaxWindow),
+                                guint(d.engine.window_size), kAtStart);
+     },
+     QDMD_UINT(s.engine.window_size)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("hop-size", "Hop size",
+                                "Frames between solves in mode=live, at most window-size (0: a "
+                                "quarter of it)",
+                                0, guint(EngineOptions::kMaxWindow), guint(d.engine.hop_size),
+                                kAtStart);
+     },
+     QDMD_UINT(s.engine.hop_size)},
+    {[](const Settings& d) {
+       return g_param_spec_enum("method", "Method", "How a window is decomposed",
+                                gst_qdmd_background_method_get_type(), gint(d.engine.dmd.method),
+                                kAtStart);
+     },
+     QDMD_ENUM(s.engine.dmd.method)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("rank", "Rank",
+                                "Singular values that the decomposition keeps (0: all); rank 1 is "
+                                "the steadiest where people stand still",
+                                0, guint(EngineOptions::kMaxWindow), guint(d.engine.dmd.rank),
+                                kAtStart);
+     },
+     QDMD_UINT(s.engine.dmd.rank)},
+    {[](const Settings& d) {
+       return g_param_spec_double("omega-threshold", "Omega threshold",
+                                  "Modes whose frequency and growth, abs(omega) in rad/frame, are "
+                                  "at most this are background (0: only the one nearest zero)",
+                                  0, G_MAXDOUBLE, d.engine.dmd.omega_threshold, kAtStart);
+     },
+     QDMD_DOUBLE(s.engine.dmd.omega_threshold)},
+    {[](const Settings& d) {
+       return g_param_spec_enum(
+           "amplitude", "Amplitude", "Which frames decide how strong the background mode is",
+           gst_qdmd_background_amplitude_get_type(), gint(d.engine.dmd.amplitude), kAtStart);
+     },
+     QDMD_ENUM(s.engine.dmd.amplitude)},
+    {[](const Settings& d) {
+       return g_param_spec_enum(
+           "solver", "Solver", "How method=qdmd is computed; same picture, other cost",
+           gst_qdmd_background_solver_get_type(), gint(d.engine.dmd.solver), kAtStart);
+     },
+     QDMD_ENUM(s.engine.dmd.solver)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("sample-step", "Sample step",
+                                "The decomposition sees every k-th pixel in x and y; the output "
+                                "stays full size (0: 1 at full rank, which depends on every pixel, "
+                                "else the coarsest step that keeps the background)",
+                                0, guint(EngineOptions::kMaxSampleStep),
+                                guint(d.engine.sample_step), kAtStart);
+     },
+     QDMD_UINT(s.engine.sample_step)},
+    {[](const Settings& d) {
+       return g_param_spec_double("foreground-threshold", "Foreground threshold",
+                                  "Distance from the background, the length of the RGB difference "
+                                  "in grey levels, above which a pixel is foreground (0: from the "
+                                  "noise of the window, at least 18)",
+                                  0, 442, d.engine.foreground_threshold, kAnyTime);
+     },
+     QDMD_DOUBLE(s.engine.foreground_threshold)},
+    {[](const Settings& d) {
+       return g_param_spec_uint64("max-memory", "Maximum memory",
+                                  "Bytes that the window may take; a larger one is an error", 0,
+                                  G_MAXUINT64, d.engine.max_memory, kAtStart);
+     },
+     [](Settings& s, const GValue* v) { s.engine.max_memory = g_value_get_uint64(v); },
+     [](const Settings& s, GValue* v) { g_value_set_uint64(v, s.engine.max_memory); }},
+    {[](const Settings& d) {
+       return g_param_spec_uint("n-threads", "Number of threads",
+                                "Threads that work on a window (0: one for each core); the "
+                                "pictures are the same for any number",
+                                0, guint(EngineOptions::kMaxThreads), guint(d.engine.threads),
+                                kAtStart);
+     },
+     QDMD_UINT(s.engine.threads)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean("freeze", "Freeze",
+                                   "Keep the background as it is and solve no more; before there "
+                                   "is a model, one is made (mode=batch: from the next window on)",
+                                   d.freeze, kAnyTime);
+     },
+     [](Settings& s, const GValue* v) { s.freeze = g_value_get_boolean(v); },
+     [](const Settings& s, GValue* v) { g_value_set_boolean(v, s.freeze); }},
+};
+
+}  // namespace
+
+void install_settings(GObjectClass* klass) {
+  static_assert(std::size(kProperties) + 1 == kFirstFreeProperty);
+  const Settings defaults;
+  guint id = 1;
+  for (const Property& property : kProperties)
+    g_object_class_install_property(klass, id++, property.spec(defaults));
+}
+
+bool set_setting(Settings* settings, guint id, const GValue* value) {
+  if (id < 1 || id >= kFirstFreeProperty) return false;
+  kProperties[id - 1].set(*settings, value);
+  return true;
+}
+
+bool get_setting(const Settings& settings, guint id, GValue* value) {
+  if (id < 1 || id >= kFirstFreeProperty) return false;
+  kProperties[id - 1].get(settings, value);
+  return true;
+}
+
+}  // namespace qdmd

@@ -1,0 +1,25 @@
+// What an application asks of qdmdbackground, as GObject properties.
+#pragma once
+
+#include <gst/gst.h>
+
+#include "core/background/engine_options.h"
+#include "core/background/foreground.h"
+
+namespace qdmd {
+
+struct Settings {
+  Output output = Output::background;
+  bool freeze = false;
+  EngineOptions engine;
+};
+
+// Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
+void install_settings(GObjectClass* klass);
+inline constexpr guint kFirstFreeProperty = 15;
+
+// False where no setting has this id. The caller holds the lock that protects `settings`.
+bool set_setting(Settings* settings, guint id, const GValue* value);
+bool get_setting(const Settings& settings, guint id, GValue* value);
+
+}  // namespace qdmd
