@@ -125,7 +125,11 @@ template <class Arithmetic, size_t kCount>
 struct Sums {
   V32 a, b, c, odd_a, odd_b, odd_c;
 
-  HWY_INLINE void clear() { a = b = c = odd_a = odd_b = odd_c = hn::Zero(D32()); }
+  // Not a constructor, which would not be compiled for the target.
+  static HWY_INLINE Sums zero() {
+    const V32 z = hn::Zero(D32());
+    return {z, z, z, z, z, z};
+  }
   HWY_INLINE void add(const typename Arithmetic::ColSample* col, V32 row_a, V32 row_b, V32 row_c) {
     add(Arithmetic::col_vector(step_at(col)), row_a, row_b, row_c);
   }
@@ -155,12 +159,11 @@ HWY_NOINLINE void tile(const int32_t* packed, size_t stride,
     return hn::LoadU(d, packed + step * stride + std::min(index, kCount - 1) * kLanes);
   };
   const ColSample *col0 = cols[0], *col1 = cols[1], *col2 = cols[2], *col3 = cols[3];
-  Sums<Arithmetic, kCount> s0, s1, s2, s3;
-  s0.clear(), s1.clear(), s2.clear(), s3.clear();
+  using Column = Sums<Arithmetic, kCount>;
+  Column s0 = Column::zero(), s1 = s0, s2 = s0, s3 = s0;
   if constexpr (Arithmetic::kCols == 8) {
     const ColSample *col4 = cols[4], *col5 = cols[5], *col6 = cols[6], *col7 = cols[7];
-    Sums<Arithmetic, kCount> s4, s5, s6, s7;
-    s4.clear(), s5.clear(), s6.clear(), s7.clear();
+    Column s4 = s0, s5 = s0, s6 = s0, s7 = s0;
     for (size_t k = 0; k < steps; ++k) {
       const V32 a = vector(k, 0), b = vector(k, 1), c = vector(k, 2);
       const size_t p = k * kStep;
@@ -260,8 +263,7 @@ class Rows {
     const size_t stride = vectors_ * kLanes;
     const V32 black = Arithmetic::col_vector(0);
     // Four, so that a sum need not wait for the one before.
-    Sums<Arithmetic, 1> sums0, sums1, sums2, sums3;
-    sums0.clear(), sums1.clear(), sums2.clear(), sums3.clear();
+    auto sums0 = Sums<Arithmetic, 1>::zero(), sums1 = sums0, sums2 = sums0, sums3 = sums0;
     const auto put = [&](size_t step, V32 lanes, auto& black_sums) HWY_ATTR {
       hn::StoreU(lanes, d, packed + step * stride);
       if constexpr (Arithmetic::kOffset) black_sums.add(black, lanes, lanes, lanes);
