@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <type_traits>
 
 #if defined(__x86_64__) || defined(__i386__)
 #include <cpuid.h>
@@ -17,6 +16,7 @@
 #define HWY_TARGET_INCLUDE "core/gram/tile_kernel.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 // Without vectors a plain loop does as well: kernel.cpp has one.
@@ -35,6 +35,10 @@ constexpr size_t kLanes = HWY_LANES(int32_t);
 // 128 bits: the steps of one row that are packed at once.
 using Block = hn::FixedTag<int32_t, 4>;
 constexpr size_t kBlockSteps = 4;
+
+// Pixels that are asked for ahead of their turn: so many planes are read at once that machines do
+// not follow all of them by themselves.
+constexpr size_t kCacheLine = 64, kAhead = 512;
 
 // One step, in one lane.
 template <typename Sample>
@@ -121,7 +125,11 @@ template <class Arithmetic, size_t kCount>
 struct Sums {
   V32 a, b, c, odd_a, odd_b, odd_c;
 
-  HWY_INLINE void clear() { a = b = c = odd_a = odd_b = odd_c = hn::Zero(D32()); }
+  // Not a constructor, which would not be compiled for the target.
+  static HWY_INLINE Sums zero() {
+    const V32 z = hn::Zero(D32());
+    return {z, z, z, z, z, z};
+  }
   HWY_INLINE void add(const typename Arithmetic::ColSample* col, V32 row_a, V32 row_b, V32 row_c) {
     add(Arithmetic::col_vector(step_at(col)), row_a, row_b, row_c);
   }
@@ -151,15 +159,20 @@ HWY_NOINLINE void tile(const int32_t* packed, size_t stride,
     return hn::LoadU(d, packed + step * stride + std::min(index, kCount - 1) * kLanes);
   };
   const ColSample *col0 = cols[0], *col1 = cols[1], *col2 = cols[2], *col3 = cols[3];
-  Sums<Arithmetic, kCount> s0, s1, s2, s3;
-  s0.clear(), s1.clear(), s2.clear(), s3.clear();
+  using Column = Sums<Arithmetic, kCount>;
+  Column s0 = Column::zero(), s1 = s0, s2 = s0, s3 = s0;
   if constexpr (Arithmetic::kCols == 8) {
     const ColSample *col4 = cols[4], *col5 = cols[5], *col6 = cols[6], *col7 = cols[7];
-    Sums<Arithmetic, kCount> s4, s5, s6, s7;
-    s4.clear(), s5.clear(), s6.clear(), s7.clear();
+    Column s4 = s0, s5 = s0, s6 = s0, s7 = s0;
     for (size_t k = 0; k < steps; ++k) {
       const V32 a = vector(k, 0), b = vector(k, 1), c = vector(k, 2);
       const size_t p = k * kStep;
+      if (p % kCacheLine == 0) {
+        hwy::Prefetch(col0 + p + kAhead), hwy::Prefetch(col1 + p + kAhead);
+        hwy::Prefetch(col2 + p + kAhead), hwy::Prefetch(col3 + p + kAhead);
+        hwy::Prefetch(col4 + p + kAhead), hwy::Prefetch(col5 + p + kAhead);
+        hwy::Prefetch(col6 + p + kAhead), hwy::Prefetch(col7 + p + kAhead);
+      }
       s0.add(col0 + p, a, b, c), s1.add(col1 + p, a, b, c);
       s2.add(col2 + p, a, b, c), s3.add(col3 + p, a, b, c);
       s4.add(col4 + p, a, b, c), s5.add(col5 + p, a, b, c);
@@ -225,7 +238,7 @@ class Rows {
     const size_t col_count = std::min(target.col_count, first_row + count_);
     for (size_t j = 0; j < col_count; j += Arithmetic::kCols) {
       const size_t here = std::min(Arithmetic::kCols, col_count - j);
-      const typename Arithmetic::ColSample* columns[Arithmetic::kCols];
+      const ColSample* columns[Arithmetic::kCols];
       for (size_t k = 0; k < Arithmetic::kCols; ++k)
         columns[k] = samples_of(cols[j + std::min(k, here - 1)] + start, k);
       // Whole vectors above the diagonal are left out.
@@ -242,14 +255,16 @@ class Rows {
   }
 
  private:
+  using ColSample = typename Arithmetic::ColSample;
+
   void pack_vector(const uint8_t* const* rows, size_t start, int32_t* packed, int32_t* offset) {
     const D32 d;
     const hn::Repartition<uint64_t, D32> d64;
     const size_t stride = vectors_ * kLanes;
     const V32 black = Arithmetic::col_vector(0);
-    Sums<Arithmetic, 1> black_sums;
-    black_sums.clear();
-    const auto put = [&](size_t step, V32 lanes) HWY_ATTR {
+    // Four, so that a sum need not wait for the one before.
+    auto sums0 = Sums<Arithmetic, 1>::zero(), sums1 = sums0, sums2 = sums0, sums3 = sums0;
+    const auto put = [&](size_t step, V32 lanes, auto& black_sums) HWY_ATTR {
       hn::StoreU(lanes, d, packed + step * stride);
       if constexpr (Arithmetic::kOffset) black_sums.add(black, lanes, lanes, lanes);
     };
@@ -264,6 +279,8 @@ class Rows {
     size_t k = 0;
     for (; k + kBlockSteps <= steps_; k += kBlockSteps) {
       const size_t p = start + k * Arithmetic::kStep;
+      if (p / kCacheLine != (p - kBlockSteps * Arithmetic::kStep) / kCacheLine)
+        for (size_t r = 0; r < kLanes; ++r) hwy::Prefetch(rows[r] + p + kAhead);
       const V32 row0 = row_blocks<Arithmetic>(d, rows, p);
       const V32 row1 = row_blocks<Arithmetic>(d, rows + 1, p);
       const V32 row2 = row_blocks<Arithmetic>(d, rows + 2, p);
@@ -272,16 +289,17 @@ class Rows {
       const V32 low23 = hn::InterleaveLower(d, row2, row3);
       const V32 high01 = hn::InterleaveUpper(d, row0, row1);
       const V32 high23 = hn::InterleaveUpper(d, row2, row3);
-      put(k, pair(low01, low23)), put(k + 1, upper_pair(low01, low23));
-      put(k + 2, pair(high01, high23)), put(k + 3, upper_pair(high01, high23));
+      put(k, pair(low01, low23), sums0), put(k + 1, upper_pair(low01, low23), sums1);
+      put(k + 2, pair(high01, high23), sums2), put(k + 3, upper_pair(high01, high23), sums3);
     }
     for (; k < steps_; ++k) {
       HWY_ALIGN int32_t lanes[kLanes];
       for (size_t r = 0; r < kLanes; ++r)
         lanes[r] = Arithmetic::row_step(rows[r] + start + k * Arithmetic::kStep);
-      put(k, hn::Load(d, lanes));
+      put(k, hn::Load(d, lanes), sums0);
     }
-    black_sums.store(offset);
+    sums0.a = hn::Add(hn::Add(sums0.a, sums1.a), hn::Add(sums2.a, sums3.a));
+    sums0.store(offset);
   }
 
   // sums: of column j with the rows from `begin` on.
@@ -302,23 +320,22 @@ class Rows {
     }
   }
 
-  const uint8_t* samples_of(
-      const uint8_t* col, size_t) requires std::is_same_v<typename Arithmetic::ColSample, uint8_t> {
-    return col;
-  }
-  const int16_t* samples_of(const uint8_t* col, size_t index) requires
-      std::is_same_v<typename Arithmetic::ColSample, int16_t> {
-    std::copy_n(col, steps_ * Arithmetic::kStep, widened_[index]);
-    return widened_[index];
+  // The packed pixels of a column, the `index`-th of a tile, as the arithmetic takes them.
+  const ColSample* samples_of(const uint8_t* col, size_t index) {
+    if constexpr (kWiden) {
+      std::copy_n(col, steps_ * Arithmetic::kStep, widened_[index]);
+      return widened_[index];
+    } else {
+      (void)index;
+      return col;
+    }
   }
 
   alignas(64) int32_t packed_[kMost * Arithmetic::kPixels / Arithmetic::kStep];
   alignas(64) int32_t sums_[kMost * Arithmetic::kCols];
   alignas(64) int32_t offset_[kMost];  // sums with a black column
-  // Of bytes only one element, which nobody reads.
-  static constexpr size_t kWidened =
-      sizeof(typename Arithmetic::ColSample) > 1 ? Arithmetic::kPixels : 1;
-  int16_t widened_[Arithmetic::kCols][kWidened];
+  static constexpr bool kWiden = sizeof(ColSample) > 1;
+  ColSample widened_[Arithmetic::kCols][kWiden ? Arithmetic::kPixels : 1];
   size_t count_ = 0, steps_ = 0, vectors_ = 0;
 };
 
