@@ -93,8 +93,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("sample-step", "Sample step",
                                 "The decomposition sees every k-th pixel in x and y; the output "
-                                "stays full size (0: 1 at full rank, which depends on every pixel, "
-                                "else the coarsest step that keeps the background)",
+                                "stays full size (0: all pixels; no coarser step kept the "
+                                "background of every test sequence within 0.1 level)",
                                 0, guint(EngineOptions::kMaxSampleStep),
                                 guint(d.engine.sample_step), kAtStart);
      },

@@ -8,26 +8,15 @@ namespace qdmd {
 namespace {
 
 // The coarsest step that moved the background of no sequence of docs/sampling.md by more than 0.1
-// level, at any rank below full.
-constexpr int kLowRankStep = 1;
-
-bool is_full_rank(const EngineOptions& options) {
-  return options.dmd.rank == 0 || options.dmd.rank >= options.window_size - 1;
-}
-
-int sample_step_of(const EngineOptions& options) {
-  if (options.sample_step > 0) return options.sample_step;
-  // At full rank the mode nearest the origin depends on every pixel; the other solvers are asked
-  // for where digits matter.
-  return is_full_rank(options) || options.dmd.solver != Solver::gram ? 1 : kLowRankStep;
-}
+// level: there is none above 1 at any rank.
+constexpr int kChosenStep = 1;
 
 }  // namespace
 
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   EngineLayout layout;
-  layout.sample_step = sample_step_of(options);
+  layout.sample_step = options.sample_step > 0 ? options.sample_step : kChosenStep;
   layout.capacity = options.window_size;
   if (options.mode == Mode::live)
     layout.capacity += LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels))
