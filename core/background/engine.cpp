@@ -171,6 +171,8 @@ void Engine::solve() {
 void Engine::push_live(const ImageView& frame) {
   const auto count = [this](bool published) {
     if (!published) return;
+    // It may have been asked for while the solve was under way.
+    set_foreground_threshold(options_.foreground_threshold);
     has_model_ = true;
     frozen_ = false;
     ++solves_;
@@ -189,10 +191,10 @@ void Engine::push_live(const ImageView& frame) {
     start_new_window_ = false;
   }
   take_in(frame);
-  if (!freeze) {
-    solver_.append(window_);
+  // Frozen, too: its ring keeps in step with the window's.
+  solver_.append(window_);
+  if (!freeze)
     count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_));
-  }
   ready_ = 1;
 }
 
