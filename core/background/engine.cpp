@@ -141,9 +141,9 @@ void Engine::push_batch(const ImageView& frame) {
 void Engine::add_group(int frames) {
   side_->finish();
   not_in_gram_ = 0;
-  side_->start([this, frames, span = SnapshotRange(window_).newest(pending_)] {
-    solver_.add_to_gram(span, frames);
-  });
+  group_ = Group{SnapshotRange(window_).newest(pending_), frames};
+  // What a std::function holds without memory of its own.
+  side_->start([this] { solver_.add_to_gram(group_->span, group_->frames); });
 }
 
 // Batch: a model for the window as it is.
