@@ -141,9 +141,9 @@ void Engine::push_batch(const ImageView& frame) {
 void Engine::add_group(int frames) {
   side_->finish();
   not_in_gram_ = 0;
-  side_->start([this, frames, span = SnapshotRange(window_).newest(pending_)] {
-    solver_.add_to_gram(span, frames);
-  });
+  group_ = Group{SnapshotRange(window_).newest(pending_), frames};
+  // What a std::function holds without memory of its own.
+  side_->start([this] { solver_.add_to_gram(group_->span, group_->frames); });
 }
 
 // Batch: a model for the window as it is.
@@ -171,6 +171,8 @@ void Engine::solve() {
 void Engine::push_live(const ImageView& frame) {
   const auto count = [this](bool published) {
     if (!published) return;
+    // It may have been asked for while the solve was under way.
+    set_foreground_threshold(options_.foreground_threshold);
     has_model_ = true;
     frozen_ = false;
     ++solves_;
@@ -189,10 +191,10 @@ void Engine::push_live(const ImageView& frame) {
     start_new_window_ = false;
   }
   take_in(frame);
-  if (!freeze) {
-    solver_.append(window_);
+  // Frozen, too: its ring keeps in step with the window's.
+  solver_.append(window_);
+  if (!freeze)
     count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_));
-  }
   ready_ = 1;
 }
 

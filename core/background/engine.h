@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "core/background/alpha_store.h"
 #include "core/background/engine_options.h"
@@ -59,6 +60,12 @@ class Engine {
   void add_group(int frames);
   void solve();
 
+  // Frames on their way into the Gram matrix.
+  struct Group {
+    SnapshotRange span;
+    int frames;
+  };
+
   EngineOptions options_;
   int width_ = 0, height_ = 0;
   std::unique_ptr<Pool> pool_;
@@ -67,9 +74,10 @@ class Engine {
   WindowSolver solver_;
   LiveSolver live_;
   uint64_t solves_ = 0;
-  int pending_ = 0;      // the newest `pending_` frames of the window
-  int ready_ = 0;        // how many of them may be popped
-  int not_in_gram_ = 0;  // batch: newest frames whose inner products are not computed yet
+  int pending_ = 0;             // the newest `pending_` frames of the window
+  int ready_ = 0;               // how many of them may be popped
+  int not_in_gram_ = 0;         // batch: newest frames whose inner products are not computed yet
+  std::optional<Group> group_;  // batch: what the side thread is at
   bool has_model_ = false, start_new_window_ = false;
   bool freeze_ = false, frozen_ = false;  // as asked for, and as done
 

@@ -33,10 +33,13 @@ int LiveSchedule::slices(int64_t snapshots) const {
       std::clamp<uint64_t>((bytes + kSliceBytes - 1) / kSliceBytes, 1, kMostGroup));
 }
 
+int LiveSchedule::largest_group() const {
+  return ceil_divide(hop_size_, ceil_divide(hop_size_, kMostGroup));
+}
+
 int LiveSchedule::most_late_frames() const {
   if (at_once()) return 0;
-  const int group = ceil_divide(hop_size_, ceil_divide(hop_size_, kMostGroup));
-  return std::min(most_slices(), group) - 1 +
+  return std::min(most_slices(), largest_group()) - 1 +
          std::min({most_slices(), kMostBuildSlices, hop_size_});
 }
 
@@ -69,7 +72,8 @@ LiveSchedule::Step LiveSchedule::next() {
   }
   const int64_t size = std::min<int64_t>(frames_, window_size_);
   const auto until_next = static_cast<int>(group_end(groups_done_ + 1) - frames_);
-  step.gram_slices = std::min(slices(size), until_next);
+  // A hop of the warm-up may be a larger group, but there are no frames to spare for it.
+  step.gram_slices = std::min({slices(size), until_next, largest_group()});
   if (step.solve)
     step.build_slices =
         std::min({slices(size), kMostBuildSlices, static_cast<int>(solve_at_ - start_)});

@@ -41,6 +41,8 @@ class LiveSchedule {
  private:
   int slices(int64_t snapshots) const;
   int most_slices() const { return slices(window_size_); }
+  // Of the groups of a whole hop.
+  int largest_group() const;
   void plan(int64_t next_solve);
 
   int window_size_ = 2, hop_size_ = 1;

@@ -75,18 +75,22 @@ void WindowSolver::decompose(const SnapshotRange& snapshots) {
   const auto start = std::chrono::steady_clock::now();
   const SnapshotRange columns = sample_step_ > 1 ? snapshots.in(samples_) : snapshots;
   const Decomposition decomposition = qdmd::decompose(columns, gram_.matrix(columns), options_);
-  next_report_ = SolveReport();
-  next_report_.dmd = decomposition.summary;
-  next_report_.window_frames = snapshots.size();
-  next_report_.sample_step = sample_step_;
-  next_report_.gram_time = gram_seconds_;
+  decomposed_ = SolveReport();
+  decomposed_.dmd = decomposition.summary;
+  decomposed_.window_frames = snapshots.size();
+  decomposed_.sample_step = sample_step_;
+  decomposed_.gram_time = gram_seconds_;
   gram_seconds_ = 0;
   snapshots_ = snapshots;
-  models_[next()].begin(snapshots, decomposition.background, keep_pictures_);
-  next_report_.solve_time = seconds_since(start);
+  background_ = decomposition.background;
+  decomposed_.solve_time = seconds_since(start);
 }
 
 void WindowSolver::build(int index, int count) {
+  if (index == 0) {
+    next_report_ = decomposed_;
+    models_[next()].begin(*snapshots_, background_, keep_pictures_);
+  }
   const size_t pixels = snapshots_->pixels();
   const size_t first = slice_start(pixels, index, count);
   const size_t length = slice_start(pixels, index + 1, count) - first;

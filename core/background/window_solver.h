@@ -44,7 +44,8 @@ class WindowSolver {
   // all of `span`. Slices of a group come in order.
   void add_to_gram(const SnapshotRange& span, int frames, int index = 0, int count = 1);
   // Once the Gram matrix has all snapshots. They stay as they are until build() and finish() are
-  // done and, unless pictures are kept, until the next solve.
+  // done and, unless pictures are kept, until the next solve. What is finished and not yet
+  // published stays, too.
   void decompose(const SnapshotRange& snapshots);
   // Slice `index` of `count` of the modes' pictures; slices come in order, then finish().
   void build(int index = 0, int count = 1);
@@ -67,7 +68,10 @@ class WindowSolver {
   Window samples_;
   SlidingGram gram_;
   double gram_seconds_ = 0;
-  std::optional<SnapshotRange> snapshots_;  // of the newest decompose()
+  // Of the newest decompose().
+  std::optional<SnapshotRange> snapshots_;
+  TemporalModel background_;
+  SolveReport decomposed_;
   // Where pictures are kept, one is evaluated while the next is built.
   BackgroundModel models_[2];
   int newest_ = 0;
