@@ -36,6 +36,8 @@ GType gst_qdmd_background_method_get_type() {
   static const GEnumValue values[] = {
       {int(qdmd::Method::qdmd), "Quaternion DMD of the coupled colour channels", "qdmd"},
       {int(qdmd::Method::dmd), "Exact DMD of each colour channel by itself", "dmd"},
+      {int(qdmd::Method::robust),
+       "Quaternion DMD of the window without what moves or stands in the way: no ghosts", "robust"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundMethod", values);
   return type;

@@ -100,6 +100,14 @@ const Property kProperties[] = {
      },
      QDMD_UINT(s.engine.sample_step)},
     {[](const Settings& d) {
+       return g_param_spec_uint("iterations", "Iterations",
+                                "How often method=robust takes out the foreground and decomposes "
+                                "what is left",
+                                1, guint(EngineOptions::kMaxIterations), guint(d.engine.iterations),
+                                kAtStart);
+     },
+     QDMD_UINT(s.engine.iterations)},
+    {[](const Settings& d) {
        return g_param_spec_double("foreground-threshold", "Foreground threshold",
                                   "Distance from the background, the length of the RGB difference "
                                   "in grey levels, above which a pixel is foreground (0: from the "

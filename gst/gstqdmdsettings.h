@@ -16,7 +16,7 @@ struct Settings {
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 15;
+inline constexpr guint kFirstFreeProperty = 16;
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.
 bool set_setting(Settings* settings, guint id, const GValue* value);

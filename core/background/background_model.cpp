@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace qdmd {
 namespace {
@@ -32,6 +33,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
   frozen_ = false;
+  gains_.clear();
   planes_.clear();
   for (int t = 0; t < snapshots.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
@@ -43,18 +45,26 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
 }
 
 void BackgroundModel::build_slice(size_t first, size_t count) {
-  if (direct_) return;
+  if (!direct_) combine_runs(planes_.data(), first, first, count);
+}
+
+void BackgroundModel::build_from(const uint8_t* const* planes, size_t first, size_t count) {
+  combine_runs(planes, 0, first, count);
+}
+
+// planes[j][from] is the first sample of pixel `first`.
+void BackgroundModel::combine_runs(const uint8_t* const* planes, size_t from, size_t first,
+                                   size_t count) {
   // Short runs, whose samples of all planes stay in the second-level cache for every group of
   // pictures.
   constexpr size_t kRun = 256;
   std::array<float*, 4> sums;
-  const size_t end = first + count;
-  for (; first < end; first += kRun)
+  for (size_t done = 0; done < count; done += kRun)
     for (size_t k = 0; k < picture_count(); k += 4) {
       const size_t group = std::min<size_t>(4, picture_count() - k);
-      for (size_t i = 0; i < group; ++i) sums[i] = pictures_[k + i] + first;
-      combine_planes(coefficients_.data() + k * planes_.size(), group, planes_.data(),
-                     planes_.size(), first, std::min(kRun, end - first), sums.data());
+      for (size_t i = 0; i < group; ++i) sums[i] = pictures_[k + i] + first + done;
+      combine_planes(coefficients_.data() + k * planes_.size(), group, planes, planes_.size(),
+                     from + done, std::min(kRun, count - done), sums.data());
     }
 }
 
@@ -66,6 +76,12 @@ void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel&
 void BackgroundModel::set_time(double t) {
   if (frozen_) return;
   model_.weights(t, &time_weights_);
+  if (!gains_.empty()) {
+    const auto last = static_cast<double>(gains_.size() - 1);
+    const Gain& gain = gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
+    for (size_t c = 0; c < gain.size(); ++c)
+      time_weights_.row(static_cast<Eigen::Index>(c)) *= gain[c];
+  }
   if (direct_) {
     direct_weights_.noalias() = time_weights_ * basis_;
     group_by_four(direct_weights_, &coefficients_);

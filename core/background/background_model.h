@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "core/background/combine.h"
@@ -9,6 +11,10 @@
 #include "core/gram/window.h"
 
 namespace qdmd {
+
+// How much brighter than another picture of the scene one is, in R, G and B; 1: the same light.
+using Gain = std::array<float, kChannels>;
+constexpr Gain kSameLight = {1, 1, 1};
 
 // L(t) of one solved window. A few modes are kept as pictures, which makes a frame cost 3 K
 // products per pixel; many modes, whose pictures would take more memory than the window itself,
@@ -25,6 +31,14 @@ class BackgroundModel {
              bool keep_pictures = false);
   void build_slice(size_t first, size_t count);
   static constexpr size_t kSliceUnit = 64;
+  // A slice from other samples than the snapshots': planes[j] begins with pixel `first` and can be
+  // read up to the next multiple of 64 samples. Not where the combination is direct.
+  void build_from(const uint8_t* const* planes, size_t first, size_t count);
+  // Of the snapshots: L(t) is multiplied by them, at other times by the nearest one. Kept until
+  // begin().
+  void set_gains(std::vector<Gain> gains) { gains_ = std::move(gains); }
+  // For set_time() from now on, in place of the snapshots' gains.
+  void set_light(const Gain& gain) { gains_.assign(1, gain); }
 
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
@@ -43,6 +57,7 @@ class BackgroundModel {
   // The same before rounding, at a `first` that is a multiple of kSliceUnit, where the combination
   // is direct.
   void combine_directly(size_t first, size_t count, float* const* out) const;
+  void combine_runs(const uint8_t* const* planes, size_t from, size_t first, size_t count);
   void make_pictures(size_t count);
 
   TemporalModel model_;
@@ -55,6 +70,7 @@ class BackgroundModel {
   std::vector<float> samples_;  // of the pictures, one after another
   std::vector<float*> pictures_;
   std::vector<float> weights_;  // 3 x K over pictures
+  std::vector<Gain> gains_;     // of the snapshots; none: the same light
 };
 
 }  // namespace qdmd

@@ -56,8 +56,8 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   const bool live = options.mode == Mode::live;
   // Where frames make room for others before their model is used, its modes are pictures.
   if (live) dmd.max_modes = BackgroundModel::most_modes(options.window_size);
-  solver_ =
-      WindowSolver(dmd, layout.capacity, width, height, layout.sample_step, live, pool_.get());
+  solver_ = WindowSolver(dmd, options.iterations, layout.capacity, width, height,
+                         layout.sample_step, live, pool_.get());
   live_ = LiveSolver(LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels)),
                      &solver_, side_.get());
   alpha_ = AlphaStore(layout.capacity);

@@ -16,7 +16,10 @@ constexpr int kChosenStep = 1;
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   EngineLayout layout;
-  layout.sample_step = options.sample_step > 0 ? options.sample_step : kChosenStep;
+  layout.sample_step = options.sample_step > 0 ? options.sample_step
+                       : options.dmd.method == Method::robust
+                           ? RobustSolver::chosen_step(width, height)
+                           : kChosenStep;
   layout.capacity = options.window_size;
   if (options.mode == Mode::live)
     layout.capacity += LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels))
@@ -36,6 +39,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
     return {Code::invalid_options, "window-size must be 2 to 2048 frames"};
   if (options.hop_size < 0 || options.hop_size > options.window_size)
     return {Code::invalid_options, "hop-size must be 0 (a quarter of the window) to window-size"};
+  if (options.iterations < 1 || options.iterations > EngineOptions::kMaxIterations)
+    return {Code::invalid_options, "iterations must be 1 to 20"};
   if (options.sample_step < 0 || options.sample_step > EngineOptions::kMaxSampleStep)
     return {Code::invalid_options, "sample-step must be 0 (chosen) to 64"};
   if (options.dmd.rank < 0 || !(options.dmd.omega_threshold >= 0) ||
@@ -52,7 +57,7 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "A window-size of " + frames + " needs " + std::to_string(layout.bytes) +
                 " bytes and max-memory allows " + std::to_string(options.max_memory) +
                 ": lower window-size, scale the video down, or raise max-memory."};
-  if (options.dmd.method == Method::qdmd && options.dmd.solver == Solver::adjoint) {
+  if (options.dmd.method != Method::dmd && options.dmd.solver == Solver::adjoint) {
     const double pixels = static_cast<double>(width) * static_cast<double>(height);
     const double solver = adjoint_bytes(pixels, options.window_size);
     if (solver > static_cast<double>(options.max_memory))

@@ -18,13 +18,15 @@ struct EngineOptions {
   int window_size = 100;  // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;       // frames between solves in live mode, up to m; 0: m / 4
   DmdOptions dmd;
+  int iterations = 2;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window may take
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
 
-  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = 256, kMaxSampleStep = 64;
+  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = 256, kMaxSampleStep = 64,
+                       kMaxIterations = 20;
 };
 
 // Why a call was refused. The message is a sentence for the user that says what to change.

@@ -31,15 +31,19 @@ uint64_t WindowSolver::sample_bytes(int capacity, int width, int height, int sam
   return Window::bytes(capacity, sampled(width, sample_step) * sampled(height, sample_step));
 }
 
-WindowSolver::WindowSolver(const DmdOptions& options, int capacity, int width, int height,
-                           int sample_step, bool keep_pictures, Pool* pool)
+WindowSolver::WindowSolver(const DmdOptions& options, int iterations, int capacity, int width,
+                           int height, int sample_step, bool keep_pictures, Pool* pool)
     : options_(options),
       width_(width),
       height_(height),
       sample_step_(sample_step),
       keep_pictures_(keep_pictures),
-      pool_(pool),
-      gram_(capacity, pool) {
+      pool_(pool) {
+  if (robust()) {
+    robust_ = RobustSolver(options, iterations, sample_step, capacity, width, height, pool);
+    return;
+  }
+  gram_ = SlidingGram(capacity, pool);
   if (sample_step_ > 1)
     samples_ = Window(capacity, sampled(width, sample_step) * sampled(height, sample_step));
 }
@@ -50,8 +54,9 @@ void WindowSolver::clear() {
 }
 
 void WindowSolver::append(const Window& window) {
-  if (sample_step_ == 1) return;
   const int slot = window.slot(window.size() - 1);
+  if (robust()) robust_.append(window, slot);
+  if (robust() || sample_step_ == 1) return;
   samples_.append();
   for (int c = 0; c < kChannels; ++c) {
     uint8_t* to = samples_.plane(slot, c);
@@ -63,6 +68,7 @@ void WindowSolver::append(const Window& window) {
 }
 
 void WindowSolver::add_to_gram(const SnapshotRange& span, int frames, int index, int count) {
+  if (robust()) return;
   const auto start = std::chrono::steady_clock::now();
   const SnapshotRange columns = sample_step_ > 1 ? span.in(samples_) : span;
   const size_t first = slice_start(columns.plane_size(), index, count);
@@ -73,24 +79,33 @@ void WindowSolver::add_to_gram(const SnapshotRange& span, int frames, int index,
 
 void WindowSolver::decompose(const SnapshotRange& snapshots) {
   const auto start = std::chrono::steady_clock::now();
-  const SnapshotRange columns = sample_step_ > 1 ? snapshots.in(samples_) : snapshots;
-  const Decomposition decomposition = qdmd::decompose(columns, gram_.matrix(columns), options_);
   decomposed_ = SolveReport();
-  decomposed_.dmd = decomposition.summary;
+  if (!robust()) {
+    const SnapshotRange columns = sample_step_ > 1 ? snapshots.in(samples_) : snapshots;
+    Decomposition decomposition = qdmd::decompose(columns, gram_.matrix(columns), options_);
+    decomposed_.dmd = decomposition.summary;
+    background_ = std::move(decomposition.background);
+  }
   decomposed_.window_frames = snapshots.size();
   decomposed_.sample_step = sample_step_;
   decomposed_.gram_time = gram_seconds_;
   gram_seconds_ = 0;
   snapshots_ = snapshots;
-  background_ = decomposition.background;
   decomposed_.solve_time = seconds_since(start);
 }
 
 void WindowSolver::build(int index, int count) {
   if (index == 0) {
     next_report_ = decomposed_;
-    models_[next()].begin(*snapshots_, background_, keep_pictures_);
+    if (robust()) {
+      const auto start = std::chrono::steady_clock::now();
+      next_report_.dmd = robust_.solve(*snapshots_, &models_[next()]);
+      next_report_.solve_time = seconds_since(start);
+    } else {
+      models_[next()].begin(*snapshots_, background_, keep_pictures_);
+    }
   }
+  if (robust()) return;
   const size_t pixels = snapshots_->pixels();
   const size_t first = slice_start(pixels, index, count);
   const size_t length = slice_start(pixels, index + 1, count) - first;

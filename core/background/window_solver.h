@@ -5,6 +5,7 @@
 
 #include "core/background/background_model.h"
 #include "core/background/foreground.h"
+#include "core/background/robust/robust_solver.h"
 #include "core/dmd/options.h"
 #include "core/gram/gram.h"
 
@@ -29,8 +30,8 @@ class WindowSolver {
   WindowSolver() = default;
   // For windows of `capacity` frames of width x height pixels, of which the decomposition sees
   // every sample_step-th in x and y. keep_pictures: the model outlives its window's frames.
-  WindowSolver(const DmdOptions& options, int capacity, int width, int height, int sample_step,
-               bool keep_pictures, Pool* pool);
+  WindowSolver(const DmdOptions& options, int iterations, int capacity, int width, int height,
+               int sample_step, bool keep_pictures, Pool* pool);
 
   // Bytes that the sampled pixels take beside the window: none where all are seen.
   static uint64_t sample_bytes(int capacity, int width, int height, int sample_step);
@@ -61,12 +62,15 @@ class WindowSolver {
  private:
   int next() const { return keep_pictures_ ? 1 - newest_ : newest_; }
 
+  bool robust() const { return options_.method == Method::robust; }
+
   DmdOptions options_;
   int width_ = 0, height_ = 0, sample_step_ = 1;
   bool keep_pictures_ = false;
   Pool* pool_ = nullptr;
   Window samples_;
   SlidingGram gram_;
+  RobustSolver robust_;
   double gram_seconds_ = 0;
   // Of the newest decompose().
   std::optional<SnapshotRange> snapshots_;

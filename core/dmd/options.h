@@ -6,8 +6,9 @@
 namespace qdmd {
 
 enum class Method {
-  qdmd,  // quaternion DMD, the paper's Algorithm 2
-  dmd    // exact DMD of each colour channel by itself, the paper's Algorithm 1
+  qdmd,   // quaternion DMD, the paper's Algorithm 2
+  dmd,    // exact DMD of each colour channel by itself, the paper's Algorithm 1
+  robust  // the paper's Algorithm 2 on a window without its foreground (RobustSolver)
 };
 
 enum class Solver {

@@ -1,0 +1,22 @@
+// Global changes of light: how much brighter a frame is than another picture of the same scene.
+#pragma once
+
+#include <vector>
+
+#include "core/background/background_model.h"
+#include "core/background/robust/grid.h"
+
+namespace qdmd {
+
+// The gains of frames 0 .. count - 1 over their common background: 1 where a change of light does
+// not explain what the frame and the background differ in, so that what moves counts as no light.
+// Small changes around the light of most frames are left out: they are noise.
+std::vector<Gain> light_of(const GridFrames& frames, int count);
+
+// Sets changes within 5 % of the light of most frames to 1, with a soft edge; all gains become
+// relative to that light. Does nothing where no light is that of half of the frames.
+void settle_light(std::vector<Gain>* gains);
+
+inline bool is_lit(const Gain& gain) { return gain != kSameLight; }
+
+}  // namespace qdmd

@@ -1,0 +1,19 @@
+// The median of the frames that show the background, and how far they lie from it.
+#pragma once
+
+#include "core/background/robust/light.h"
+#include "core/background/robust/stable_frames.h"
+
+namespace qdmd {
+
+// Frames of a pixel's median, at most.
+constexpr int kMedianFrames = 31;
+
+// background[c][p]: the median over the frames of p's cell, in unit light; more than kMedianFrames
+// are thinned evenly. spread[p]: the median of their quaternion distances from it, in steps of 1/4
+// level, up to 255. frame_of[i]: the snapshot that stable frame i is; gains: of all snapshots.
+void median_picture(const SnapshotRange& snapshots, const Grid& grid, const StableFrames& stable,
+                    const std::vector<int>& frame_of, const std::vector<Gain>& gains, Pool* pool,
+                    uint8_t* const background[3], uint8_t* spread);
+
+}  // namespace qdmd

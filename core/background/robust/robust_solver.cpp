@@ -1,0 +1,184 @@
+#include "core/background/robust/robust_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/background/robust/median_picture.h"
+
+namespace qdmd {
+namespace {
+
+// Frames that the start compares, at most: more cost time and say little new.
+constexpr int kStartFrames = 160;
+
+// A pixel is foreground above this, and above so many spreads of the frames that show its
+// background.
+constexpr int kLeastThreshold = 12;
+constexpr int kSpreads = 4;
+// Samples within one spread of the background, at least so many levels, count in full.
+constexpr int kLeastReach = 2;
+
+// Bytes of filled rows that are combined at once: they stay in the second-level cache.
+constexpr size_t kStripBytes = size_t{1} << 20;
+
+int sampled(int size, int step) { return (size + step - 1) / step; }
+
+}  // namespace
+
+int RobustSolver::chosen_step(int width, int height) {
+  return std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0)));
+}
+
+RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity,
+                           int width, int height, Pool* pool)
+    : options_(options),
+      iterations_(iterations),
+      step_(sample_step),
+      pool_(pool),
+      grid_(width, height),
+      cells_(grid_, capacity),
+      samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
+                             static_cast<size_t>(sampled(height, sample_step))),
+      gram_(capacity, pool) {
+  // What the paper fits to the first frame depends on what stood there.
+  options_.amplitude = Amplitude::window;
+  options_.method = Method::qdmd;
+  if (options_.rank == 0) options_.rank = 1;
+  reference_.width = width;
+  reference_.height = height;
+}
+
+void RobustSolver::append(const Window& window, int slot) {
+  for (int c = 0; c < kChannels; ++c)
+    cell_means(grid_, window.plane(slot, c), cells_.plane(slot, c));
+}
+
+// The background picture of the stable frames, its thresholds, and the light of each frame.
+void RobustSolver::start(const SnapshotRange& snapshots) {
+  const int m = snapshots.size();
+  GridFrames frames(grid_, m);
+  for (int t = 0; t < m; ++t)
+    for (int c = 0; c < kChannels; ++c)
+      std::copy_n(cells_.plane(snapshots.slot(t), c), grid_.cells(), frames.plane(t, c));
+  gains_ = light_of(frames, m);
+
+  const int count = std::min(m, kStartFrames);
+  std::vector<int> frame_of(static_cast<size_t>(count));
+  GridFrames chosen(grid_, count);
+  for (int i = 0; i < count; ++i) {
+    const int t = static_cast<int>(int64_t{i} * m / count);
+    frame_of[static_cast<size_t>(i)] = t;
+    for (int c = 0; c < kChannels; ++c) {
+      const float inverse = 1 / gains_[static_cast<size_t>(t)][static_cast<size_t>(c)];
+      std::transform(frames.plane(t, c), frames.plane(t, c) + grid_.cells(), chosen.plane(i, c),
+                     [inverse](float level) { return level * inverse; });
+    }
+  }
+  const StableFrames stable = find_stable_frames(grid_, chosen, count, pool_);
+
+  const size_t pixels = reference_.pixels();
+  uint8_t* background[kChannels];
+  for (size_t c = 0; c < kChannels; ++c) {
+    reference_.level[c].resize(pixels);
+    background[c] = reference_.level[c].data();
+  }
+  std::vector<uint8_t> spread(pixels);
+  reach_.resize(pixels);
+  median_picture(snapshots, grid_, stable, frame_of, gains_, pool_, background, spread.data());
+  blur(spread.data(), reference_.width, reference_.height, reach_.data());
+  reference_.threshold.resize(pixels);
+  for (size_t p = 0; p < pixels; ++p) {
+    // In steps of 1/4 level.
+    const int wide = reach_[p];
+    reference_.threshold[p] =
+        static_cast<uint8_t>(std::clamp((kSpreads * wide + 3) / 4, kLeastThreshold, 255));
+    reach_[p] = static_cast<uint8_t>(std::max((wide + 2) / 4, kLeastReach));
+  }
+  reference_.reach.clear();
+}
+
+Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
+  samples_.clear();
+  for (int t = 0; t < snapshots.size(); ++t) {
+    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                 snapshots.plane(t, 2)};
+    const int slot = samples_.append();
+    uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
+                             samples_.plane(slot, 2)};
+    fill_samples(reference_, x, gains_[static_cast<size_t>(t)], step_, out);
+  }
+  gram_.add_newest(samples_, samples_.size());
+  return decompose(samples_, gram_.matrix(samples_), options_);
+}
+
+// The modes' pictures from filled frames, strip by strip.
+void RobustSolver::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
+  const size_t planes = static_cast<size_t>(snapshots.size()) * kChannels;
+  const auto width = static_cast<size_t>(reference_.width);
+  const int rows = static_cast<int>(std::clamp<size_t>(kStripBytes / (planes * width), 4, 64));
+  const size_t padded = (static_cast<size_t>(rows) * width + 63) / 64 * 64;
+  struct Strip {
+    std::vector<uint8_t> samples, scratch;
+    std::vector<const uint8_t*> planes;
+  };
+  std::vector<Strip> strips(pool_->threads());
+  for (Strip& strip : strips) {
+    strip.samples.resize(planes * padded);
+    strip.scratch.reserve(width * 32 + 128);
+    for (size_t k = 0; k < planes; ++k) strip.planes.push_back(strip.samples.data() + k * padded);
+  }
+  const auto parts = static_cast<size_t>((reference_.height + rows - 1) / rows);
+  pool_->run(parts, [&](size_t part, size_t worker) {
+    Strip& strip = strips[worker];
+    const int first = static_cast<int>(part) * rows;
+    const int count = std::min(rows, reference_.height - first);
+    for (int t = 0; t < snapshots.size(); ++t) {
+      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                   snapshots.plane(t, 2)};
+      uint8_t* const out[3] = {strip.samples.data() + (3 * static_cast<size_t>(t) + 0) * padded,
+                               strip.samples.data() + (3 * static_cast<size_t>(t) + 1) * padded,
+                               strip.samples.data() + (3 * static_cast<size_t>(t) + 2) * padded};
+      fill_rows(reference_, x, gains_[static_cast<size_t>(t)], first, count, out, &strip.scratch);
+    }
+    model->build_from(strip.planes.data(), static_cast<size_t>(first) * width,
+                      static_cast<size_t>(count) * width);
+  });
+}
+
+// The next background picture: L(t) in unit light.
+void RobustSolver::take_reference(BackgroundModel* model, double t) {
+  model->set_time(t);
+  for (size_t first = 0; first < reference_.pixels(); first += kMaxRun) {
+    const size_t count = std::min(kMaxRun, reference_.pixels() - first);
+    uint8_t* const out[3] = {reference_.level[0].data() + first, reference_.level[1].data() + first,
+                             reference_.level[2].data() + first};
+    model->evaluate(first, count, out);
+  }
+}
+
+DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, BackgroundModel* model) {
+  start(snapshots);
+  DmdSummary summary;
+  for (int iteration = 0; iteration < iterations_; ++iteration) {
+    if (std::any_of(gains_.begin(), gains_.end(), is_lit)) {
+      for (int t = 0; t < snapshots.size(); ++t) {
+        const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                     snapshots.plane(t, 2)};
+        Gain& gain = gains_[static_cast<size_t>(t)];
+        gain = refine_gain(reference_, x, gain, step_);
+      }
+      settle_light(&gains_);
+    }
+    const Decomposition decomposition = decompose_filled(snapshots);
+    summary = decomposition.summary;
+    model->begin(snapshots, decomposition.background, true);
+    combine(snapshots, model);
+    if (iteration + 1 == iterations_) break;
+    take_reference(model, snapshots.size() / 2);
+    reference_.reach = reach_;
+  }
+  model->set_gains(gains_);
+  return summary;
+}
+
+}  // namespace qdmd

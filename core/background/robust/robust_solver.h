@@ -1,0 +1,54 @@
+// Robust Q-DMD: the background modes of a window whose foreground was taken out.
+#pragma once
+
+#include "core/background/background_model.h"
+#include "core/background/robust/fill.h"
+#include "core/background/robust/stable_frames.h"
+#include "core/dmd/decompose.h"
+#include "core/gram/gram.h"
+
+namespace qdmd {
+
+// The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
+//   start    for each region the frames that show its background (find_stable_frames), and their
+//            median: a background picture and its spread
+//   repeat   what differs from the picture is foreground and becomes background (fill_rows); Q-DMD
+//   of
+//            the filled window, of rank 1 unless another is asked for, with amplitudes fitted to
+//            all frames, is the next background
+// Global changes of light are divided out before and put back in L(t). Inner products are taken
+// from sampled pixels, exactly; the pictures of the modes are combined from all.
+class RobustSolver {
+ public:
+  RobustSolver() = default;
+  // For windows of `capacity` frames of width x height pixels. `iterations` >= 1.
+  RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity, int width,
+               int height, Pool* pool);
+
+  // The step that leaves about 120 samples along the short side.
+  static int chosen_step(int width, int height);
+
+  // Takes in the frame in `slot` of `window`.
+  void append(const Window& window, int slot);
+  // Makes `model` the window's background.
+  DmdSummary solve(const SnapshotRange& snapshots, BackgroundModel* model);
+
+ private:
+  void start(const SnapshotRange& snapshots);
+  Decomposition decompose_filled(const SnapshotRange& snapshots);
+  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
+  void take_reference(BackgroundModel* model, double t);
+
+  DmdOptions options_;
+  int iterations_ = 1, step_ = 1;
+  Pool* pool_ = nullptr;
+  Grid grid_;
+  GridFrames cells_;  // by slot
+  Reference reference_;
+  std::vector<uint8_t> reach_;
+  std::vector<Gain> gains_;  // of the snapshots
+  Window samples_;           // filled
+  SlidingGram gram_;
+};
+
+}  // namespace qdmd
