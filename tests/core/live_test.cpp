@@ -174,6 +174,64 @@ TEST(Engine, ThreadsChangeNoByte) {
     }
 }
 
+// ---- Whole pictures ----
+
+// Many rows are written in bands, each row in several runs.
+TEST(EngineLive, LargePicturesWithAndWithoutGaps) {
+  std::mt19937 rng(314);
+  constexpr int kWidth = 1301, kHeight = 97;
+  const Clip clip = random_clip(static_cast<size_t>(kWidth * kHeight), 4, rng);
+  for (int padding : {0, 7})
+    for (int bytes : {3, 4}) {
+      auto options = live_of(3, 1);
+      options.threads = 2;
+      options.foreground_threshold = 120;
+      Engine engine;
+      ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+      for (size_t t = 0; t < 4; ++t) {
+        Picture in(kWidth, kHeight, bytes, false, padding),
+            out(kWidth, kHeight, bytes, false, padding);
+        in.fill(clip.frames[t]);
+        ASSERT_TRUE(engine.push(in.in()).ok());
+        engine.pop(kOutputs[t], out.out());
+        const size_t size = std::min<size_t>(t + 1, 3);
+        FreshModel model(part_of(clip, t + 1 - size, size), options);
+        const auto background = model.background(static_cast<double>(size - 1));
+        ASSERT_TRUE(out.planes() == picture_of(clip.frames[t], background, kOutputs[t], 120))
+            << bytes << " bytes a pixel, gap " << padding << ", frame " << t;
+        // What lies between the rows is not ours.
+        for (int row = 0; row < kHeight; ++row)
+          for (int i = 0; i < padding; ++i)
+            ASSERT_EQ(out.bytes[static_cast<size_t>((row + 1) * out.row_stride - 1 - i)],
+                      kUntouched);
+      }
+    }
+}
+
+TEST(EngineLive, AlphaGoesWithItsFrame) {
+  std::mt19937 rng(315);
+  constexpr int kWidth = 75, kHeight = 3;
+  auto options = live_of(4, 2);
+  options.foreground_threshold = 60;
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  for (int t = 0; t < 24; ++t) {
+    Picture in(kWidth, kHeight, 4, true), out(kWidth, kHeight, 4, true);
+    for (uint8_t& byte : in.bytes) byte = static_cast<uint8_t>(rng() >> 9);
+    const auto constant = static_cast<uint8_t>(10 * t);
+    // Alpha that varies, that is constant, and that varies in the last pixel only.
+    for (size_t p = 0; p < in.pixels() && t % 3 > 0; ++p) in.at(3, p) = constant;
+    if (t % 3 == 2) in.at(3, in.pixels() - 1) ^= 1;
+    ASSERT_TRUE(engine.push(in.in()).ok());
+    engine.pop(kOutputs[t % 4], out.out());
+    for (size_t p = 0; p < in.pixels(); ++p) {
+      const bool hidden =
+          kOutputs[t % 4] == Output::cutout && out.at(3, p) == 0 && out.at(0, p) == 0;
+      ASSERT_TRUE(hidden || out.at(3, p) == in.at(3, p)) << "frame " << t << ", pixel " << p;
+    }
+  }
+}
+
 // ---- Breaks in time ----
 
 TEST(EngineLive, DrainKeepsTheBackgroundUntilThereIsANewModel) {
