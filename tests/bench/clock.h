@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
+#include <ctime>
 #include <vector>
 
 namespace qdmd::bench {
@@ -12,11 +14,24 @@ inline double seconds() {
   return duration<double>(steady_clock::now().time_since_epoch()).count();
 }
 
+// Seconds of all threads of this process on a core: what others take of the machine is not in it.
+inline double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
 template <typename Work>
 double seconds_of(Work&& work) {
   const double start = seconds();
   work();
   return seconds() - start;
+}
+
+// How often the programs that compare things in turn do so: the variable QDMD_BENCH_TURNS.
+inline int turns_asked_for() {
+  const char* asked = std::getenv("QDMD_BENCH_TURNS");
+  return asked ? std::max(1, std::atoi(asked)) : 7;
 }
 
 // The value below which a share of `values` lies; 0 of none.

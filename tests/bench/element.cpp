@@ -245,42 +245,43 @@ void time_per_frame(benchmark::State& state, const Case& size) {
   const auto peers = peers_of(frames);
   for (const auto& peer : peers) peer->run(peer->warm_up());
 
-  std::vector<std::vector<double>> times(peers.size());
+  std::vector<std::vector<double>> times(peers.size()), cpu_times(peers.size());
   size_t taken = 0;
   for (auto _ : state)
     for (size_t i = 0; i < peers.size(); ++i) {
       const size_t share = share_of(*peers[i], size);
       bool complete = false;
+      const double cpu = cpu_seconds();
       const double took = seconds_of([&] { complete = peers[i]->run(share); });
       if (!complete) {
         state.SkipWithError((peers[i]->name() + " lost frames").c_str());
         return;
       }
       times[i].push_back(1e3 * took / double(share));
+      cpu_times[i].push_back(1e3 * (cpu_seconds() - cpu) / double(share));
       taken += share;
     }
 
-  const auto time_of = [&](const std::string& name) -> const std::vector<double>& {
+  const auto index_of = [&](const char* name) {
     size_t i = 0;
     while (peers[i]->name() != name) ++i;
-    return times[i];
+    return i;
   };
-  const std::vector<double>& identity = time_of("identity");
+  const size_t identity = index_of("identity"), segmentation = index_of("segmentation");
   // Of every turn, because turns differ more than peers within one. What buffers and pads cost is
   // no part of an element's work; OpenCV's classes have none.
   const auto net = [&](size_t i) {
     std::vector<double> result = times[i];
     if (dynamic_cast<const ElementPeer*>(peers[i].get()))
-      for (size_t k = 0; k < result.size(); ++k) result[k] -= identity[k];
+      for (size_t k = 0; k < result.size(); ++k) result[k] -= times[identity][k];
     return result;
   };
-  size_t segmentation = 0;
-  while (peers[segmentation]->name() != "segmentation") ++segmentation;
   const std::vector<double> reference = net(segmentation);
   for (size_t i = 0; i < peers.size(); ++i) {
     const std::string& name = peers[i]->name();
     state.counters["ms/" + name] = median(times[i]);
-    if (name == "identity") continue;
+    state.counters["cpu/" + name] = median(cpu_times[i]);
+    if (i == identity) continue;
     const std::vector<double> own = net(i);
     std::vector<double> ratios;
     for (size_t k = 0; k < own.size(); ++k) ratios.push_back(reference[k] / own[k]);
@@ -314,8 +315,7 @@ int main(int argc, char** argv) {
       return 1;
     }
   // Iterations are turns: --benchmark_min_time changes nothing here.
-  int turns = 7;
-  if (const char* asked = g_getenv("QDMD_BENCH_TURNS")) turns = std::max(1, atoi(asked));
+  const int turns = turns_asked_for();
   for (const Case& size : kCases)
     benchmark::RegisterBenchmark(size.name().c_str(),
                                  [size](benchmark::State& state) { time_per_frame(state, size); })
