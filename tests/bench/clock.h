@@ -2,30 +2,26 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <ctime>
 #include <vector>
 
 namespace qdmd::bench {
 
-inline double seconds() {
-  using namespace std::chrono;
-  return duration<double>(steady_clock::now().time_since_epoch()).count();
-}
-
-// Seconds of all threads of this process on a core: what others take of the machine is not in it.
-inline double cpu_seconds() {
+inline double seconds_on(clockid_t clock) {
   timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  clock_gettime(clock, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+// Of all threads of this process on a core: what others take of the machine is not in it.
+inline double cpu_seconds() { return seconds_on(CLOCK_PROCESS_CPUTIME_ID); }
+
 template <typename Work>
-double seconds_of(Work&& work) {
-  const double start = seconds();
+double seconds_of(Work&& work, clockid_t clock = CLOCK_MONOTONIC) {
+  const double start = seconds_on(clock);
   work();
-  return seconds() - start;
+  return seconds_on(clock) - start;
 }
 
 // How often the programs that compare things in turn do so: the variable QDMD_BENCH_TURNS.

@@ -34,7 +34,10 @@ struct Case {
   }
 };
 
-// The frames of one window, as both kinds of peers take them, and again from the start.
+constexpr int kLiveWindow = 100, kLiveHop = 25;
+
+// Frames as both kinds of peers take them, and again from the start. No window sees one twice,
+// which would make its rank lower than that of a camera's.
 struct Frames {
   Case size;
   std::vector<std::vector<uint8_t>> rgba;
@@ -42,7 +45,7 @@ struct Frames {
 
   explicit Frames(const Case& size_) : size(size_) {
     const Camera camera(size.width, size.height, 4);
-    for (int t = 0; t < size.window; ++t) {
+    for (int t = 0; t < std::max(size.window, kLiveWindow); ++t) {
       rgba.emplace_back(camera.frame_bytes());
       camera.render(t, rgba.back().data());
       rgb.emplace_back();
@@ -145,7 +148,7 @@ class SubtractorPeer : public Peer {
 class MedianPeer : public Peer {
  public:
   explicit MedianPeer(const Frames& frames)
-      : Peer("median", frames.count(), 0),
+      : Peer("median", size_t(frames.size.window), 0),
         frames_(frames),
         background_(frames.size.height, frames.size.width, CV_8UC3) {
     // Which of the two is faster depends on the window.
@@ -163,12 +166,12 @@ class MedianPeer : public Peer {
       cv::parallel_for_(cv::Range(0, background_.rows),
                         [this](const cv::Range& range) { rows(range.start, range.end); });
     benchmark::DoNotOptimize(background_.data);
-    return count % frames_.count() == 0;
+    return count % frames_at_once() == 0;
   }
 
  private:
   void rows(int begin, int end) {
-    const size_t count = frames_.count(), samples = size_t(background_.cols) * 3;
+    const size_t count = frames_at_once(), samples = size_t(background_.cols) * 3;
     // A run of samples of all frames stays in the first-level cache.
     constexpr size_t kRun = 64;
     std::vector<uint8_t> levels(kRun * count);
@@ -201,10 +204,8 @@ class MedianPeer : public Peer {
   bool by_histogram_ = true;
 };
 
-constexpr int kLiveWindow = 100, kLiveHop = 25;
-
 std::vector<std::unique_ptr<Peer>> peers_of(const Frames& frames) {
-  const size_t window = frames.count();
+  const auto window = static_cast<size_t>(frames.size.window);
   const std::string qdmd = "qdmdbackground output=mask window-size=";
   std::vector<std::unique_ptr<Peer>> peers;
   const auto element = [&](const char* name, const std::string& description, size_t at_once,

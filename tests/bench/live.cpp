@@ -45,7 +45,7 @@ struct Watch {
 };
 
 GstPadProbeReturn enter(GstPad*, GstPadProbeInfo*, gpointer data) {
-  static_cast<Watch*>(data)->entered = seconds();
+  static_cast<Watch*>(data)->entered = seconds_on(CLOCK_MONOTONIC);
   return GST_PAD_PROBE_OK;
 }
 
@@ -53,7 +53,7 @@ GstPadProbeReturn leave(GstPad*, GstPadProbeInfo* info, gpointer data) {
   auto* watch = static_cast<Watch*>(data);
   const std::lock_guard lock(watch->mutex);
   ++watch->frames_out;
-  watch->in_element.push_back(1e3 * (seconds() - watch->entered));
+  watch->in_element.push_back(1e3 * (seconds_on(CLOCK_MONOTONIC) - watch->entered));
   const GstClockTime captured = GST_BUFFER_PTS(GST_PAD_PROBE_INFO_BUFFER(info));
   if (watch->clock)
     watch->after_capture.push_back(
