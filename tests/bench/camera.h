@@ -16,14 +16,16 @@ class Camera {
   Camera(int width, int height, int pixel_bytes)
       : width_(width), height_(height), pixel_bytes_(pixel_bytes) {
     std::mt19937 rng(5);
-    std::normal_distribution<float> normal(0, 3);
+    std::normal_distribution<double> normal(0, 3);
+    std::vector<uint8_t> levels(kNoiseLevels);
+    for (auto& level : levels)
+      level = static_cast<uint8_t>(
+          static_cast<int8_t>(std::lround(std::clamp(normal(rng), -20.0, 20.0))));
     picture_.resize(frame_bytes());
     // More noise than a frame needs: each frame begins at a place of its own.
     noise_.resize(frame_bytes() + static_cast<size_t>(pixel_bytes) * kNoisePlaces);
     for (size_t i = 0; i < noise_.size(); ++i)
-      noise_[i] = is_alpha(i) ? uint8_t{0}
-                              : static_cast<uint8_t>(static_cast<int8_t>(
-                                    std::lround(std::clamp(normal(rng), -20.0f, 20.0f))));
+      noise_[i] = is_alpha(i) ? uint8_t{0} : levels[rng() % kNoiseLevels];
     for (size_t i = 0; i < picture_.size(); ++i) {
       const size_t pixel = i / bytes(), x = pixel % size_t(width), y = pixel / size_t(width);
       const double shade =
@@ -47,7 +49,8 @@ class Camera {
   }
 
  private:
-  static constexpr int kBoxes = 3, kNoiseBits = 20, kNoisePlaces = 1 << kNoiseBits;
+  static constexpr int kBoxes = 3, kNoiseBits = 20, kNoisePlaces = 1 << kNoiseBits,
+                       kNoiseLevels = 1 << 16;
 
   size_t bytes() const { return static_cast<size_t>(pixel_bytes_); }
   bool is_alpha(size_t i) const { return pixel_bytes_ == 4 && i % 4 == 3; }
