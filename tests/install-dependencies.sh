@@ -2,19 +2,21 @@
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
-#   tests/install-dependencies.sh GROUP...      groups: build, test, demo
+#   tests/install-dependencies.sh GROUP...      groups: build, test, demo, docs
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
   libeigen3-dev libhwy-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters; OpenCV is for
-# the scene source and the evaluation.
+# the scene source and the evaluation, -opencv the element that tests/bench compares with.
 test=(python3 python3-numpy clang-format libgtest-dev libbenchmark-dev libboost-dev libopencv-dev
   libcli11-dev nlohmann-json3-dev gstreamer1.0-tools gstreamer1.0-plugins-base
-  gstreamer1.0-plugins-good gstreamer1.0-plugins-bad)
+  gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-opencv)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
 demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x libopencv-dev)
+# Plots of docs/performance.md.
+docs=(python3 python3-matplotlib)
 
 wanted=()
 for group in "$@"; do
@@ -22,7 +24,8 @@ for group in "$@"; do
     build) wanted+=("${build[@]}") ;;
     test) wanted+=("${test[@]}") ;;
     demo) wanted+=("${demo[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, demo)" >&2; exit 2 ;;
+    docs) wanted+=("${docs[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, demo, docs)" >&2; exit 2 ;;
   esac
 done
 

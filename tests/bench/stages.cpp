@@ -1,0 +1,159 @@
+// Where the time of a batch goes: a whole window through the engine's steps, each timed by itself,
+// in milliseconds for a frame. The engine runs the same steps, but the Gram matrix beside frames.
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/background/engine.h"
+#include "core/background/planes.h"
+#include "core/background/window_solver.h"
+#include "tests/bench/camera.h"
+#include "tests/bench/clock.h"
+
+namespace {
+
+using namespace qdmd;
+using namespace qdmd::bench;
+
+// As the engine does it.
+constexpr int kGroup = 16;  // frames that enter the Gram matrix together
+constexpr size_t kPixelsPerBand = 32768;
+
+struct Case {
+  int width, height, window, threads;
+};
+
+template <typename Byte>
+BasicImageView<Byte> view_of(const Case& c, Byte* rgba) {
+  BasicImageView<Byte> view;
+  for (int i = 0; i < kChannels; ++i) view.channel[i] = rgba + i;
+  view.alpha = rgba + 3;
+  view.width = c.width, view.height = c.height;
+  view.pixel_stride = 4, view.row_stride = 4 * ptrdiff_t{c.width};
+  return view;
+}
+
+constexpr const char* kStages[] = {"conversion",  "Gram",       "solve",
+                                   "combination", "statistics", "output"};
+using StageTimes = std::array<double, std::size(kStages)>;  // seconds for a window
+
+class Batch {
+ public:
+  explicit Batch(const Case& c)
+      : c_(c),
+        camera_(c.width, c.height, 4),
+        in_(camera_.frame_bytes()),
+        out_(camera_.frame_bytes()),
+        pool_(c.threads),
+        window_(c.window, static_cast<size_t>(c.width) * static_cast<size_t>(c.height)),
+        solver_(DmdOptions(), c.window, c.width, c.height, 1, false, &pool_) {}
+
+  StageTimes run() {
+    // One thread's time is what it computed, because others may use the machine.
+    const clockid_t clock = c_.threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
+    const auto took = [clock](auto&& work) { return seconds_of(work, clock); };
+    window_.clear();
+    solver_.clear();
+    StageTimes times{};
+    auto& [conversion, gram, solve, combination, statistics, output] = times;
+    for (int t = 0, fresh = 0; t < c_.window; ++t) {
+      camera_.render(t, in_.data());
+      conversion += took([&] { take_in(); });
+      if (++fresh < kGroup && t + 1 < c_.window) continue;
+      gram += took([&] { solver_.add_to_gram(window_, std::exchange(fresh, 0)); });
+    }
+    solve = took([&] { solver_.decompose(window_); });
+    combination = took([&] { solver_.build(); });
+    statistics = took([&] {
+      solver_.finish(0);
+      solver_.publish();
+    });
+    for (int t = 0; t < c_.window; ++t) output += took([&] { write(t); });
+    return times;
+  }
+  const SolveReport& report() const { return solver_.report(); }
+
+ private:
+  void take_in() {
+    const int slot = window_.append();
+    uint8_t* const to[3] = {window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)};
+    split_channels(view_of(c_, std::as_const(in_).data()), 0, c_.height, 255, to);
+    solver_.append(window_);
+  }
+
+  void write(int t) {
+    solver_.model().set_time(t);
+    const int slot = window_.slot(t);
+    const OutputTask task = {
+        {window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
+        &solver_.model(),
+        Output::mask,
+        solver_.report().foreground.threshold,
+        nullptr,
+        255};
+    const size_t bands = std::max<size_t>(1, window_.pixels() / kPixelsPerBand);
+    pool_.run(bands, [&](size_t band) {
+      const auto row = [&](size_t b) {
+        return static_cast<int>(static_cast<size_t>(c_.height) * b / bands);
+      };
+      write_output(task, view_of(c_, out_.data()), row(band), row(band + 1) - row(band));
+    });
+    benchmark::ClobberMemory();
+  }
+
+  Case c_;
+  Camera camera_;
+  std::vector<uint8_t> in_, out_;
+  Pool pool_;
+  Window window_;
+  WindowSolver solver_;
+};
+
+void stages(benchmark::State& state, const Case& c) {
+  Batch batch(c);
+  // Memory is touched for the first time.
+  batch.run();
+  std::array<std::vector<double>, std::size(kStages)> times;
+  std::vector<double> totals;
+  for (auto _ : state) {
+    const StageTimes taken = batch.run();
+    for (size_t i = 0; i < taken.size(); ++i) times[i].push_back(taken[i]);
+    totals.push_back(std::accumulate(taken.begin(), taken.end(), 0.0));
+    state.SetIterationTime(totals.back());
+    if (batch.report().dmd.background_modes == 0) state.SkipWithError("there is no background");
+  }
+  for (size_t i = 0; i < times.size(); ++i)
+    state.counters[std::string("ms/") + kStages[i]] = 1e3 * median(times[i]) / c.window;
+  state.counters["ms/total"] = 1e3 * median(totals) / c.window;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int turns = turns_asked_for();
+  std::vector<Case> cases = {{160, 120, 25, 1}};
+  for (int threads : {1, 2}) {
+    for (auto [width, height] : {std::pair{320, 240}, {640, 480}, {1280, 720}, {1920, 1080}})
+      cases.push_back({width, height, 100, threads});
+    for (int window : {25, 50, 200, 400}) cases.push_back({320, 240, window, threads});
+    cases.push_back({768, 576, 200, threads});
+    cases.push_back({1920, 1080, 60, threads});
+  }
+  for (const Case& c : cases)
+    benchmark::RegisterBenchmark(
+        ("stages/" + std::to_string(c.width) + "x" + std::to_string(c.height) +
+         "/window:" + std::to_string(c.window) + "/threads:" + std::to_string(c.threads))
+            .c_str(),
+        [c](benchmark::State& state) { stages(state, c); })
+        ->Unit(benchmark::kMillisecond)
+        ->Iterations(turns)
+        ->UseManualTime();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
