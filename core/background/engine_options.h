@@ -18,7 +18,7 @@ struct EngineOptions {
   int window_size = 100;  // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;       // frames between solves in live mode, up to m; 0: m / 4
   DmdOptions dmd;
-  int iterations = 2;  // of Method::robust, 1 .. kMaxIterations
+  int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise

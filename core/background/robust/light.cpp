@@ -12,8 +12,8 @@ constexpr float kAgree = 4;
 constexpr float kDark = 8, kBright = 250;
 // A gain must make this many times as many cells agree, and this share of all cells besides.
 constexpr float kGrowth = 1.3f, kShare = 0.1f;
-// Relative change of light that needs no following.
-constexpr float kStill = 0.05f;
+// Relative change of light that needs no following: less is a part of the noise.
+constexpr float kStill = 0.03f;
 
 float median(std::vector<float>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
