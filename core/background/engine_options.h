@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/background/live_schedule.h"
 #include "core/dmd/options.h"
 
 namespace qdmd {
@@ -52,6 +53,9 @@ struct EngineLayout {
   uint64_t bytes = 0;  // of the frames that are kept
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
+
+// Of live mode, for frames of that many pixels.
+LiveSchedule schedule_of(const EngineOptions& options, size_t pixels);
 
 // Ok where an engine can be configured so.
 Status check_options(const EngineOptions& options, int width, int height);
