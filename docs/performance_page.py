@@ -226,17 +226,16 @@ def lines(axis, results, cases, horizontal):
 
 
 def bars(axis, results, cases, label):
-    """Stages of the most threads, in nanoseconds a pixel, so that sizes can be compared."""
-    threads = max((key[3] for key in results.stages), default=1)
-    shown = [case for case in cases if (*case, threads) in results.stages]
+    """Stages on one thread, in nanoseconds a pixel, so that sizes can be compared."""
+    shown = [case for case in cases if (*case, 1) in results.stages]
     bottom = [0.0] * len(shown)
     for stage, colour in zip(STAGES, COLOURS):
-        heights = [1e6 * results.stages[(*case, threads)][f'ms/{stage}'] / (case[0] * case[1])
+        heights = [1e6 * results.stages[(*case, 1)][f'ms/{stage}'] / (case[0] * case[1])
                    for case in shown]
         axis.bar(range(len(shown)), heights, bottom=bottom, color=colour, label=stage)
         bottom = [a + b for a, b in zip(bottom, heights)]
     axis.set_xticks(range(len(shown)), [label(case) for case in shown], fontsize=7)
-    axis.set_ylabel(f'ns a pixel and frame, {threads} threads')
+    axis.set_ylabel('ns a pixel and frame, one thread')
     axis.grid(True, axis='y', alpha=0.3)
     axis.legend(fontsize=7)
 
