@@ -18,8 +18,8 @@ PEERS = (('qdmd', 'qdmdbackground'), ('qdmd_rank_1', 'qdmdbackground rank=1'),
 STAGES = ('conversion', 'Gram', 'solve', 'combination', 'statistics', 'output')
 # Colours of Okabe and Ito, told apart by all eyes.
 COLOURS = ('#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999', '#000000')
-# From this share of memory's speed on, memory is what a pass waits for.
-MEMORY_BOUND = 0.7
+# The share of memory's speed below which a pass computes, and from which on it waits for memory.
+ARITHMETIC_BELOW, MEMORY_FROM = 0.5, 0.8
 
 
 def table(head, rows):
@@ -120,7 +120,7 @@ def passes_table(results):
                       figure(run.get('of_memory'))]
         run = results.passes.get((name, *sizes[0]), {})
         rows.append([name, figure(run.get('bytes/pixel')), *cells])
-    head = ['pass', 'bytes a pixel']
+    head = ['pass', f'bytes a pixel at {sizes[0][0]}x{sizes[0][1]}']
     for width, height in sizes:
         head += [f'{width}x{height}: ns a pixel', 'GB/s', 'of memory']
     return table(head, rows)
@@ -142,7 +142,9 @@ def gram_table(results):
 
 def bounds_table(results):
     def verdict(share):
-        return 'memory' if share >= MEMORY_BOUND else 'arithmetic'
+        if share >= MEMORY_FROM:
+            return 'memory'
+        return 'arithmetic' if share < ARITHMETIC_BELOW else 'both'
 
     rows = []
     sizes = sorted({key[1:] for key in results.passes})
