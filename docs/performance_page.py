@@ -224,7 +224,7 @@ def lines(axis, results, cases, horizontal):
     axis.set_yscale('log')
     axis.set_ylabel('ms a frame, less identity')
     axis.grid(True, which='major', alpha=0.3)
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, -0.16), ncol=4)
 
 
 def bars(axis, results, cases, label):
@@ -239,13 +239,13 @@ def bars(axis, results, cases, label):
     axis.set_xticks(range(len(shown)), [label(case) for case in shown], fontsize=7)
     axis.set_ylabel('ns a pixel and frame, one thread')
     axis.grid(True, axis='y', alpha=0.3)
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, -0.16), ncol=4)
 
 
 def plot(path, results, cases, horizontal, title, label):
     cases = sorted(cases, key=lambda case: (case[0] * case[1], case[2]))
     with plt.rc_context({'svg.hashsalt': 'qdmd', 'font.size': 9}):
-        drawing, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout='constrained')
+        drawing, (left, right) = plt.subplots(1, 2, figsize=(10, 4.6), layout='constrained')
         lines(left, results, cases, horizontal)
         left.set_xlabel(title)
         bars(right, results, cases, label)
