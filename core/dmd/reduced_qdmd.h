@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/dmd/snapshot_factor.h"
+#include "core/quaternion/arnoldi.h"
 #include "core/quaternion/pencil.h"
 #include "core/quaternion/schur.h"
 #include "core/quaternion/svd.h"
@@ -191,9 +192,45 @@ struct PastSpectrum {
   Eigen::Matrix<Real, Eigen::Dynamic, 1> sigma;
   QuaternionMatrix<Real> u, v_over_s;
 };
+
+// The largest singular value alone, with its vector: in frames of one scene it stands out so far
+// that a few steps of Arnoldi's method (Lanczos's, since X X^H is Hermitian) find it. Empty where
+// they do not.
+template <typename Real>
+std::optional<PastSpectrum<Real>> leading_spectrum(const QuaternionMatrix<Real>& past) {
+  constexpr Eigen::Index kMostSteps = 24;
+  using std::sqrt;
+  const auto past_h = past.conjugate_transpose();
+  const auto apply = [&](const std::vector<Quaternion<Real>>& v) {
+    return to_column<Real>(past * (past_h * to_matrix(v)));
+  };
+  Arnoldi<Real, decltype(apply)> space(apply, past.rows());
+  while (space.dimension() < kMostSteps && !space.complete()) {
+    if (!space.step()) return std::nullopt;
+    const auto ritz = space.ritz();
+    if (!ritz.converged) return std::nullopt;
+    const Real value = ritz.values[0].real();
+    if (!(value > Real(0))) return std::nullopt;
+    if (ritz.residuals[0] > std::numeric_limits<Real>::epsilon() * value) continue;
+    PastSpectrum<Real> result;
+    result.sigma.resize(1);
+    result.sigma(0) = sqrt(value);
+    result.u = to_matrix(space.combine(ritz.coordinates[0]));
+    return result;
+  }
+  return std::nullopt;
+}
+
 template <typename Real>
 PastSpectrum<Real> past_spectrum(const SnapshotFactor<Real>& factor, Eigen::Index limit) {
   const auto past = factor.r.left_cols(factor.r.cols() - 1);
+  if (limit == 1) {
+    if (auto leading = leading_spectrum<Real>(past)) {
+      leading->v_over_s = past.conjugate_transpose() *
+                          leading->u.scale_cols(leading->sigma.cwiseInverse().cwiseAbs2().eval());
+      return *std::move(leading);
+    }
+  }
   PastSpectrum<Real> result;
   Eigen::Matrix<Real, Eigen::Dynamic, 1> values;
   QuaternionMatrix<Real> u;
