@@ -4,7 +4,7 @@
 #
 #   docs/make-performance.sh [--short | --page]
 #
-# --short: a minute, to try the script; its numbers say little. --page: from the results of last time.
+# --short: two minutes, to try the script; its numbers say little. --page: from the results of last time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

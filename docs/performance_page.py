@@ -18,8 +18,8 @@ PEERS = (('qdmd', 'qdmdbackground'), ('qdmd_rank_1', 'qdmdbackground rank=1'),
 STAGES = ('conversion', 'Gram', 'solve', 'combination', 'statistics', 'output')
 # Colours of Okabe and Ito, told apart by all eyes.
 COLOURS = ('#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999', '#000000')
-# From this share of memory's speed on, memory is what a pass waits for.
-MEMORY_BOUND = 0.7
+# The share of memory's speed below which a pass computes, and from which on it waits for memory.
+ARITHMETIC_BELOW, MEMORY_FROM = 0.5, 0.8
 
 
 def table(head, rows):
@@ -120,7 +120,7 @@ def passes_table(results):
                       figure(run.get('of_memory'))]
         run = results.passes.get((name, *sizes[0]), {})
         rows.append([name, figure(run.get('bytes/pixel')), *cells])
-    head = ['pass', 'bytes a pixel']
+    head = ['pass', f'bytes a pixel at {sizes[0][0]}x{sizes[0][1]}']
     for width, height in sizes:
         head += [f'{width}x{height}: ns a pixel', 'GB/s', 'of memory']
     return table(head, rows)
@@ -142,7 +142,9 @@ def gram_table(results):
 
 def bounds_table(results):
     def verdict(share):
-        return 'memory' if share >= MEMORY_BOUND else 'arithmetic'
+        if share >= MEMORY_FROM:
+            return 'memory'
+        return 'arithmetic' if share < ARITHMETIC_BELOW else 'both'
 
     rows = []
     sizes = sorted({key[1:] for key in results.passes})
@@ -222,29 +224,28 @@ def lines(axis, results, cases, horizontal):
     axis.set_yscale('log')
     axis.set_ylabel('ms a frame, less identity')
     axis.grid(True, which='major', alpha=0.3)
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, -0.16), ncol=4)
 
 
 def bars(axis, results, cases, label):
-    """Stages of the most threads, in nanoseconds a pixel, so that sizes can be compared."""
-    threads = max((key[3] for key in results.stages), default=1)
-    shown = [case for case in cases if (*case, threads) in results.stages]
+    """Stages on one thread, in nanoseconds a pixel, so that sizes can be compared."""
+    shown = [case for case in cases if (*case, 1) in results.stages]
     bottom = [0.0] * len(shown)
     for stage, colour in zip(STAGES, COLOURS):
-        heights = [1e6 * results.stages[(*case, threads)][f'ms/{stage}'] / (case[0] * case[1])
+        heights = [1e6 * results.stages[(*case, 1)][f'ms/{stage}'] / (case[0] * case[1])
                    for case in shown]
         axis.bar(range(len(shown)), heights, bottom=bottom, color=colour, label=stage)
         bottom = [a + b for a, b in zip(bottom, heights)]
     axis.set_xticks(range(len(shown)), [label(case) for case in shown], fontsize=7)
-    axis.set_ylabel(f'ns a pixel and frame, {threads} threads')
+    axis.set_ylabel('ns a pixel and frame, one thread')
     axis.grid(True, axis='y', alpha=0.3)
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, loc='upper center', bbox_to_anchor=(0.5, -0.16), ncol=4)
 
 
 def plot(path, results, cases, horizontal, title, label):
     cases = sorted(cases, key=lambda case: (case[0] * case[1], case[2]))
     with plt.rc_context({'svg.hashsalt': 'qdmd', 'font.size': 9}):
-        drawing, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout='constrained')
+        drawing, (left, right) = plt.subplots(1, 2, figsize=(10, 4.6), layout='constrained')
         lines(left, results, cases, horizontal)
         left.set_xlabel(title)
         bars(right, results, cases, label)

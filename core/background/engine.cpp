@@ -58,8 +58,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   if (live) dmd.max_modes = BackgroundModel::most_modes(options.window_size);
   solver_ = WindowSolver(dmd, options.iterations, layout.capacity, width, height,
                          layout.sample_step, live, pool_.get());
-  live_ = LiveSolver(LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels)),
-                     &solver_, side_.get());
+  live_ = LiveSolver(schedule_of(options, pixels), &solver_, side_.get());
   alpha_ = AlphaStore(layout.capacity);
   window_ = Window(layout.capacity, pixels);
   return {};
@@ -195,6 +194,7 @@ void Engine::push_live(const ImageView& frame) {
   solver_.append(window_);
   if (!freeze)
     count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_));
+  if (!frozen_) solver_.follow_light(window_.slot(window_.size() - 1));
   ready_ = 1;
 }
 

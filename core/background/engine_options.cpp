@@ -13,6 +13,11 @@ constexpr int kChosenStep = 1;
 
 }  // namespace
 
+LiveSchedule schedule_of(const EngineOptions& options, size_t pixels) {
+  return LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels),
+                      options.dmd.method == Method::robust);
+}
+
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   EngineLayout layout;
@@ -22,8 +27,7 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
                            : kChosenStep;
   layout.capacity = options.window_size;
   if (options.mode == Mode::live)
-    layout.capacity += LiveSchedule(options.window_size, options.hop_size, Window::bytes(1, pixels))
-                           .most_late_frames();
+    layout.capacity += schedule_of(options, pixels).most_late_frames();
   const uint64_t samples =
       WindowSolver::sample_bytes(layout.capacity, width, height, layout.sample_step);
   if (__builtin_add_overflow(Window::bytes(layout.capacity, pixels), samples, &layout.bytes))

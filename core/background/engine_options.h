@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/background/live_schedule.h"
 #include "core/dmd/options.h"
 
 namespace qdmd {
@@ -18,7 +19,7 @@ struct EngineOptions {
   int window_size = 100;  // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;       // frames between solves in live mode, up to m; 0: m / 4
   DmdOptions dmd;
-  int iterations = 2;  // of Method::robust, 1 .. kMaxIterations
+  int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
@@ -52,6 +53,9 @@ struct EngineLayout {
   uint64_t bytes = 0;  // of the frames that are kept
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
+
+// Of live mode, for frames of that many pixels.
+LiveSchedule schedule_of(const EngineOptions& options, size_t pixels);
 
 // Ok where an engine can be configured so.
 Status check_options(const EngineOptions& options, int width, int height);

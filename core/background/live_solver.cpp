@@ -16,6 +16,7 @@ void LiveSolver::stop() {
   }
   group_.reset();
   build_.reset();
+  piece_due_.reset();
   finished_.reset();
 }
 
@@ -28,16 +29,23 @@ bool LiveSolver::publish() {
 }
 
 bool LiveSolver::settle() {
+  if (piece_due_ && schedule_.frames() + 1 < *piece_due_) return false;
+  piece_due_.reset();
   side_->finish();
   return publish();
 }
 
 bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_once) {
   const LiveSchedule::Step step = schedule_.next();
+  // Frames that are kept for a solve in progress are no part of the window.
+  const int size = static_cast<int>(
+      std::min<int64_t>({schedule_.frames(), schedule_.window_size(), window.size()}));
+  if (schedule_.in_one_piece()) {
+    if (!step.solve) return false;
+    fixed_threshold_ = fixed_threshold;
+    return start_piece(step, SnapshotRange(window).newest(size), at_once);
+  }
   if (step.group > 0) {
-    // Frames that are kept for a solve in progress are no part of the window.
-    const int size = static_cast<int>(
-        std::min<int64_t>({schedule_.frames(), schedule_.window_size(), window.size()}));
     group_ = Group{SnapshotRange(window).newest(size),
                    step.group,
                    step.gram_slices,
@@ -54,6 +62,19 @@ bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_onc
   }
   while (group_ || build_) work();
   return publish();
+}
+
+bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange& span,
+                             bool at_once) {
+  solver_->decompose(span);
+  build_ = Build{1, 0, schedule_.frames() - span.size()};
+  if (at_once) {
+    work();
+    return publish();
+  }
+  piece_due_ = schedule_.frames() + step.build_slices;
+  side_->start([this] { work(); });
+  return false;
 }
 
 // One frame's share. Pictures come first: the solve after them needs their place.

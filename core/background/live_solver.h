@@ -11,7 +11,8 @@ namespace qdmd {
 
 // Before a frame enters the window: settle(). After that: start(). What LiveSchedule has for the
 // frame then runs on the side thread until the next settle(), or at once where it is little or
-// where there is no model yet. Models are therefore published at fixed frames.
+// where there is no model yet. A solve in one piece (LiveSchedule) goes on over several frames.
+// Models are therefore published at fixed frames.
 class LiveSolver {
  public:
   LiveSolver() = default;
@@ -49,6 +50,7 @@ class LiveSolver {
     int64_t first_frame;
   };
 
+  bool start_piece(const LiveSchedule::Step& step, const SnapshotRange& span, bool at_once);
   void work();
   bool publish();
 
@@ -59,7 +61,8 @@ class LiveSolver {
   // The side thread's between start() and settle().
   std::optional<Group> group_;
   std::optional<Build> build_;
-  std::optional<int64_t> finished_;  // first frame of a solve that waits to be published
+  std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
+  std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
   double fixed_threshold_ = 0;
 };
 

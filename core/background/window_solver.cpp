@@ -121,8 +121,13 @@ void WindowSolver::finish(double fixed_threshold) {
   next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], fixed_threshold);
 }
 
+void WindowSolver::follow_light(int slot) {
+  if (robust()) model().set_light(robust_.light(slot));
+}
+
 void WindowSolver::publish() {
   newest_ = next();
+  if (robust()) robust_.publish();
   report_ = next_report_;
 }
 

@@ -54,6 +54,10 @@ class WindowSolver {
   void finish(double fixed_threshold);
   void publish();
 
+  // Sets the model to the light of the frame in `slot` of the window, where the method follows
+  // light.
+  void follow_light(int slot);
+
   // Of the newest published solve.
   BackgroundModel& model() { return models_[newest_]; }
   SolveReport& report() { return report_; }

@@ -50,7 +50,8 @@ class Batch {
         out_(camera_.frame_bytes()),
         pool_(c.threads),
         window_(c.window, static_cast<size_t>(c.width) * static_cast<size_t>(c.height)),
-        solver_(DmdOptions(), c.window, c.width, c.height, 1, false, &pool_) {}
+        solver_(DmdOptions(), EngineOptions().iterations, c.window, c.width, c.height, 1, false,
+                &pool_) {}
 
   StageTimes run() {
     // One thread's time is what it computed, because others may use the machine.

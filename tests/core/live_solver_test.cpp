@@ -33,7 +33,7 @@ struct Spread {
         pool(threads),
         side(beside),
         window(window_size + schedule.most_late_frames(), pixels),
-        solver(limited(options_), window.capacity(), static_cast<int>(pixels), 1,
+        solver(limited(options_), 1, window.capacity(), static_cast<int>(pixels), 1,
                std::max(options_.sample_step, 1), true, &pool),
         live(schedule, &solver, &side) {
     live.restart(false);

@@ -14,8 +14,8 @@ constexpr float kDark = 8, kBright = 250;
 constexpr float kGrowth = 1.3f, kShare = 0.1f;
 // Frames are divided by gains.
 constexpr float kLeastGain = 0.01f;
-// Relative change of light that needs no following.
-constexpr float kStill = 0.05f;
+// Relative change of light that needs no following: less is a part of the noise.
+constexpr float kStill = 0.03f;
 
 float median(std::vector<float>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
@@ -75,20 +75,17 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   return gain;
 }
 
-std::vector<Gain> gains_over(const GridFrames& frames, int count, const GridFrames& reference) {
-  const float* const background[3] = {reference.plane(0, 0), reference.plane(0, 1),
-                                      reference.plane(0, 2)};
-  std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
-  for (int t = 0; t < count; ++t) {
-    const float* const frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-    const float before = agreement(frame, background, frames.cells(), kSameLight);
-    // What agrees needs no other light, and cannot gain enough.
-    if (kGrowth * before + kShare >= 1) continue;
-    const Gain gain = shared_gain(frame, background, frames.cells());
-    if (agreement(frame, background, frames.cells(), gain) > kGrowth * before + kShare)
-      gains[static_cast<size_t>(t)] = gain;
-  }
-  return gains;
+Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, int reference) {
+  const float* const frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+  const float* const background[3] = {references.plane(reference, 0),
+                                      references.plane(reference, 1),
+                                      references.plane(reference, 2)};
+  const float before = agreement(frame, background, frames.cells(), kSameLight);
+  // What agrees needs no other light, and cannot gain enough.
+  if (kGrowth * before + kShare >= 1) return kSameLight;
+  const Gain gain = shared_gain(frame, background, frames.cells());
+  const float after = agreement(frame, background, frames.cells(), gain);
+  return after > kGrowth * before + kShare ? gain : kSameLight;
 }
 
 // Each cell's median over some frames, in unit light.
@@ -111,14 +108,29 @@ GridFrames median_frame(const GridFrames& frames, int count, const std::vector<G
 
 float brightness(const Gain& gain) { return (gain[0] + gain[1] + gain[2]) / 3; }
 
+// 1 for small changes, with a soft edge.
+Gain without_noise(const Gain& gain) {
+  const float share = std::clamp(std::abs(std::log(brightness(gain))) / kStill - 1, 0.0f, 1.0f);
+  if (share == 0) return kSameLight;
+  Gain settled = gain;
+  for (float& g : settled) g = std::exp(std::log(g) * share);
+  return settled;
+}
+
 }  // namespace
+
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference) {
+  return without_noise(gain_over(frames, frame, background, reference));
+}
 
 std::vector<Gain> light_of(const GridFrames& frames, int count) {
   std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
   if (count < 2) return gains;
   // The second reference is sharper where light changed.
   for (int round = 0; round < 2; ++round) {
-    gains = gains_over(frames, count, median_frame(frames, count, gains));
+    const GridFrames reference = median_frame(frames, count, gains);
+    for (int t = 0; t < count; ++t)
+      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0);
     if (std::none_of(gains.begin(), gains.end(), is_lit)) return gains;
   }
   settle_light(&gains);
@@ -142,9 +154,7 @@ void settle_light(std::vector<Gain>* gains) {
   }
   for (Gain& gain : *gains) {
     for (size_t c = 0; c < kChannels; ++c) gain[c] /= common[c];
-    const float change = std::abs(std::log(brightness(gain)));
-    const float share = std::clamp(change / kStill - 1, 0.0f, 1.0f);
-    for (float& g : gain) g = share > 0 ? std::exp(std::log(g) * share) : 1.0f;
+    gain = without_noise(gain);
   }
 }
 

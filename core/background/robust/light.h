@@ -13,7 +13,11 @@ namespace qdmd {
 // Small changes around the light of most frames are left out: they are noise.
 std::vector<Gain> light_of(const GridFrames& frames, int count);
 
-// Sets changes within 5 % of the light of most frames to 1, with a soft edge; all gains become
+// The gain of one frame over picture `reference` of `background`, both on the same grid; 1 where it
+// does not explain what they differ in, or is small.
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference);
+
+// Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.
 void settle_light(std::vector<Gain>* gains);
 

@@ -16,8 +16,8 @@ namespace qdmd {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Pixels that are sorted side by side.
-constexpr size_t kRun = 64;
+// Pixels that are sorted side by side: some rows of a cell.
+constexpr size_t kRun = 128;
 // kMedianFrames and one that is never taken: a power of two.
 constexpr size_t kMost = 32;
 
@@ -53,28 +53,32 @@ void take_median(uint8_t (*samples)[kRun], size_t count, uint8_t* median) {
 
 }  // namespace
 
-// `run` <= kRun pixels of `count` frames; rows[3 i + c]: frame i's channel c there; inverse[3 i +
-// c]: what it is multiplied by.
-void median_run(const uint8_t* const* rows, const float* inverse, size_t count, size_t run,
-                uint8_t* const* background, uint8_t* spread) {
+// The pixels of `height` rows of `width` samples, kRun at most in all, that begin at rows[3 i + c]
+// in frame i's channel c, of `count` frames, and lie `stride` apart. inverse[3 i + c]: what they
+// are multiplied by. The results lie like the frames' samples.
+void median_block(const uint8_t* const* rows, const float* inverse, size_t count, size_t width,
+                  size_t height, size_t stride, uint8_t* const* background, uint8_t* spread) {
   alignas(64) uint8_t samples[kChannels][kMost][kRun], sorted[kMost][kRun], median[kChannels][kRun];
+  const auto scatter = [&](const uint8_t* from, uint8_t* to) {
+    for (size_t y = 0; y < height; ++y) std::memcpy(to + y * stride, from + y * width, width);
+  };
+  const size_t used = width * height;
   for (size_t c = 0; c < kChannels; ++c) {
     for (size_t i = 0; i < count; ++i) {
       const uint8_t* from = rows[kChannels * i + c];
       uint8_t* to = samples[c][i];
+      for (size_t y = 0; y < height; ++y) std::memcpy(to + y * width, from + y * stride, width);
+      std::memset(to + used, 0, kRun - used);
       const float factor = inverse[kChannels * i + c];
-      std::memset(to + run, 0, kRun - run);
-      if (factor == 1)
-        std::memcpy(to, from, run);
-      else
-        for (size_t x = 0; x < run; ++x) {
-          const float level = static_cast<float>(from[x]) * factor + 0.5f;
-          to[x] = static_cast<uint8_t>(static_cast<int>(level < 255.0f ? level : 255.0f));
-        }
+      if (factor == 1) continue;
+      for (size_t x = 0; x < kRun; ++x) {
+        const float level = static_cast<float>(to[x]) * factor + 0.5f;
+        to[x] = static_cast<uint8_t>(static_cast<int>(level < 255.0f ? level : 255.0f));
+      }
     }
     std::memcpy(sorted, samples[c], count * kRun);
     take_median(sorted, count, median[c]);
-    std::memcpy(background[c], median[c], run);
+    scatter(median[c], background[c]);
   }
   for (size_t i = 0; i < count; ++i)
     for (size_t x = 0; x < kRun; ++x) {
@@ -83,11 +87,12 @@ void median_run(const uint8_t* const* rows, const float* inverse, size_t count, 
       const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
       sorted[i][x] = static_cast<uint8_t>(static_cast<int>(norm < 63.75f ? 4 * norm : 255.0f));
     }
-  take_median(sorted, count, median[0]);
+  // One frame says nothing of a spread.
   if (count > 1)
-    std::memcpy(spread, median[0], run);
+    take_median(sorted, count, median[0]);
   else
-    std::memset(spread, 0, run);
+    std::memset(median[0], 0, kRun);
+  scatter(median[0], spread);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -98,9 +103,9 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
-HWY_EXPORT(median_run);
+HWY_EXPORT(median_block);
 
-constexpr int kRunPixels = 64;
+constexpr int kBlockPixels = 128;
 
 }  // namespace
 
@@ -123,16 +128,20 @@ void median_picture(const SnapshotRange& snapshots, const Grid& grid, const Stab
           inverse[kChannels * i + c] = 1 / gains[static_cast<size_t>(t)][c];
         }
       }
-      for (int y = grid.top(row); y < grid.top(row + 1); ++y)
-        for (int x = grid.left(col); x < grid.left(col + 1); x += kRunPixels) {
+      const int left = grid.left(col), right = grid.left(col + 1);
+      const int width = std::min(kBlockPixels, right - left), height = kBlockPixels / width;
+      for (int y = grid.top(row); y < grid.top(row + 1); y += height)
+        for (int x = left; x < right; x += width) {
           const auto first =
               static_cast<size_t>(y) * static_cast<size_t>(grid.width) + static_cast<size_t>(x);
-          const auto run = static_cast<size_t>(std::min(kRunPixels, grid.left(col + 1) - x));
           const uint8_t* rows[kChannels * kMedianFrames];
           for (size_t i = 0; i < kChannels * count; ++i) rows[i] = planes[i] + first;
           uint8_t* const out[3] = {background[0] + first, background[1] + first,
                                    background[2] + first};
-          HWY_DYNAMIC_DISPATCH(median_run)(rows, inverse, count, run, out, spread + first);
+          HWY_DYNAMIC_DISPATCH(median_block)
+          (rows, inverse, count, static_cast<size_t>(std::min(width, right - x)),
+           static_cast<size_t>(std::min(height, grid.top(row + 1) - y)),
+           static_cast<size_t>(grid.width), out, spread + first);
         }
     }
   });

@@ -37,6 +37,7 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
       pool_(pool),
       grid_(width, height),
       cells_(grid_, capacity),
+      background_cells_(grid_, 2),
       samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
                              static_cast<size_t>(sampled(height, sample_step))),
       gram_(capacity, pool) {
@@ -173,10 +174,12 @@ DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, BackgroundModel* 
     summary = decomposition.summary;
     model->begin(snapshots, decomposition.background, true);
     combine(snapshots, model);
-    if (iteration + 1 == iterations_) break;
     take_reference(model, snapshots.size() / 2);
     reference_.reach = reach_;
   }
+  for (int c = 0; c < kChannels; ++c)
+    cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
+               background_cells_.plane(1 - published_, c));
   model->set_gains(gains_);
   return summary;
 }

@@ -30,6 +30,10 @@ class RobustSolver {
 
   // Takes in the frame in `slot` of `window`.
   void append(const Window& window, int slot);
+  // The light of the frame in `slot` over the published background.
+  Gain light(int slot) const { return light_over(cells_, slot, background_cells_, published_); }
+  // From now on light() compares with the newest solve. Not while one runs.
+  void publish() { published_ = 1 - published_; }
   // Makes `model` the window's background.
   DmdSummary solve(const SnapshotRange& snapshots, BackgroundModel* model);
 
@@ -43,7 +47,9 @@ class RobustSolver {
   int iterations_ = 1, step_ = 1;
   Pool* pool_ = nullptr;
   Grid grid_;
-  GridFrames cells_;  // by slot
+  GridFrames cells_;             // by slot
+  GridFrames background_cells_;  // of the published and the newest solve, in unit light
+  int published_ = 0;
   Reference reference_;
   std::vector<uint8_t> reach_;
   std::vector<Gain> gains_;  // of the snapshots
