@@ -89,8 +89,9 @@ Filled naive_fill(const Case& c, const Gain& gain) {
         if (sum > 25 * r.threshold[p]) sample = level;
         if (!r.reach.empty()) {
           const int reach = r.reach[p];
-          const int drawn = 2 * level + 3 * std::clamp(sample - level, -reach, reach) + 1;
-          sample = std::clamp(drawn, 0, 511) / 2;
+          // std::round() rounds halves away from zero.
+          const double drawn = std::round(1.5 * std::clamp(sample - level, -reach, reach));
+          sample = std::clamp(level + static_cast<int>(drawn), 0, 255);
         }
         out.plane[k][p] = static_cast<uint8_t>(sample);
       }
