@@ -237,8 +237,8 @@ TEST(RobustEngine, OrderAndRateMatterLittle) {
   for (size_t t = 0; t < 50; ++t) half.frames[t] = clip.frames[2 * t];
   const double error = worst_error(backgrounds_of(clip), background());
   EXPECT_LT(worst_error(backgrounds_of(reversed), background()), 1.15 * error);
-  // Half of the frames: their noise is larger by the square root of two.
-  EXPECT_LT(worst_error(backgrounds_of(half), background()), 1.15 * std::sqrt(2.0) * error);
+  // A mean of fewer frames is more often rounded to the next level.
+  EXPECT_LT(worst_error(backgrounds_of(half), background()), 1.15 * error + 0.15);
 }
 
 TEST(RobustEngine, ThreadsChangeNothing) {
