@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "core/background/combine.h"
+#include "core/background/engine_options.h"
 #include "core/background/planes.h"
 #include "core/background/robust/robust_solver.h"
 #include "core/metrics/picture_scores.h"
@@ -18,7 +19,7 @@ using namespace qdmd::evaluation;
 
 struct Setting {
   RobustParameters parameters;
-  int iterations = 2, rank = 0, window = 300;
+  int iterations = EngineOptions().iterations, rank = 0, window = 300;
   int step = 0;  // 0: chosen
 };
 
@@ -40,7 +41,7 @@ std::vector<Variant> variants() {
   const auto inner = [](int RobustParameters::*member) {
     return [member](Setting& setting) -> int& { return setting.parameters.*member; };
   };
-  vary("iterations", &Setting::iterations, {1, 3, 4});
+  vary("iterations", &Setting::iterations, {1, 2, 3, 4});
   vary("rank", &Setting::rank, {2, 3});
   vary("sample-step", &Setting::step, {1, 4, 8});
   vary("window-size", &Setting::window, {200, 100, 50, 25});
@@ -48,7 +49,6 @@ std::vector<Variant> variants() {
   vary("cells along the short side", inner(&RobustParameters::cells_along), {24, 96});
   vary("least threshold", inner(&RobustParameters::least_threshold), {6, 24});
   vary("threshold in spreads", inner(&RobustParameters::spreads), {2, 8});
-  vary("least reach", inner(&RobustParameters::least_reach), {1, 4});
   return all;
 }
 
