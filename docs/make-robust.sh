@@ -32,11 +32,12 @@ build/tests/evaluation/qdmd-robust-ablation --dataset "$QDMD_DATA" >"$results/ab
 
 # Frames of the sequences may not be shown; simulated ones and Debian's street scene may.
 echo "== pictures" >&2
-# sheet NAME: of the methods' backgrounds, as docs/images/robust-NAME.jpg.
+# sheet NAME PICTURE: of the methods' backgrounds at the middle or last frame, as
+# docs/images/robust-NAME.jpg.
 sheet() {
   # Without truth it ends with 1.
   "${evaluate[@]}" --dataset "$results/$1" --methods robust,qdmd,median \
-    --output-dir "$results/$1-out" >/dev/null || [ -f "$results/$1-out/$1_sheet.png" ]
+    --picture "$2" --output-dir "$results/$1-out" >/dev/null || [ -f "$results/$1-out/$1_sheet.png" ]
   gst-launch-1.0 -q filesrc location="$results/$1-out/$1_sheet.png" ! pngdec ! videoconvert ! \
     videoscale method=lanczos ! video/x-raw,width=1200,pixel-aspect-ratio=1/1 ! \
     jpegenc quality=82 ! filesink location="docs/images/robust-$1.jpg"
@@ -46,14 +47,14 @@ caps="video/x-raw,width=320,height=240,framerate=5/1"
 for scene in abandon fade; do
   folder=$results/$scene
   mkdir -p "$folder/input" "$folder/gt"
-  effects=$scene
-  [ "$scene" != fade ] || effects="basic,fade=0.4:duration=20"
+  effects=$scene picture=middle frames=50
+  [ "$scene" != fade ] || { effects="basic,fade=0.4:duration=20" picture=last frames=100; }
   gst-launch-1.0 -q qdmdscenesrc scene="$effects" seed=7 num-buffers=100 ! $caps ! videoconvert ! \
     pngenc ! multifilesink location="$folder/input/%06d.png"
-  # Every frame is written over the one before: the middle one stays.
-  gst-launch-1.0 -q qdmdscenesrc scene="$effects" seed=7 truth=background num-buffers=50 ! $caps ! \
+  # Every frame is written over the one before: the one that is scored stays.
+  gst-launch-1.0 -q qdmdscenesrc scene="$effects" seed=7 truth=background num-buffers="$frames" ! $caps ! \
     videoconvert ! pngenc ! multifilesink location="$folder/gt/GT_$scene.png"
-  sheet "$scene"
+  sheet "$scene" "$picture"
 done
 video=$QDMD_DATA/videos/vtest.avi
 [ -f "$video" ] || video=build/vtest.avi
@@ -62,7 +63,7 @@ if [ -f "$video" ]; then
   gst-launch-1.0 -q filesrc location="$video" ! decodebin ! videoconvert ! videorate ! \
     video/x-raw,framerate=5/2 ! jpegenc quality=95 ! \
     multifilesink location="$results/street/input/%06d.jpg"
-  sheet street
+  sheet street middle
 fi
 
 /usr/bin/python3 - docs/robust.md "$results" <<'PYTHON'
