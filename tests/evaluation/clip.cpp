@@ -1,5 +1,6 @@
 #include "tests/evaluation/clip.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
@@ -87,6 +88,12 @@ std::vector<fs::path> Selection::of(const Sequence& sequence) const {
   for (size_t i = start; i < sequence.frames.size() && (frames == 0 || chosen.size() < frames);
        i += every)
     chosen.push_back(sequence.frames[i]);
+  if (thin > 0 && chosen.size() > thin) {
+    const size_t count = chosen.size();
+    for (size_t i = 0; i < thin; ++i) chosen[i] = chosen[i * count / thin];
+    chosen.resize(thin);
+  }
+  if (reverse) std::reverse(chosen.begin(), chosen.end());
   return chosen;
 }
 

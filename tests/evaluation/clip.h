@@ -11,9 +11,11 @@
 namespace qdmd::evaluation {
 
 // Which frames of a sequence are used: from `start` (0 is the first) every `every`-th one, `frames`
-// of them at most (0: all).
+// of them at most (0: all); of those `thin` at most (0: all), evenly spread, and the last one first
+// where `reverse`.
 struct Selection {
-  size_t start = 0, every = 1, frames = 0;
+  size_t start = 0, every = 1, frames = 0, thin = 0;
+  bool reverse = false;
 
   std::vector<std::filesystem::path> of(const Sequence& sequence) const;
 };

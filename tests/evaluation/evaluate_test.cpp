@@ -10,7 +10,7 @@
 namespace qdmd::test {
 namespace {
 
-const Arguments kAllMethods = {"qdmd", "dmd", "median", "mean", "mog2", "knn"};
+const Arguments kAllMethods = {"qdmd", "dmd", "robust", "median", "mean", "mog2", "knn"};
 
 // ---- Tables ----
 
@@ -151,6 +151,42 @@ TEST(Selection, TakesTheFramesThatItSays) {
   const Result none = evaluate({"--dataset", (data / "all").string(), "--start", "30"});
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_TRUE(none.says("all: no frames are left")) << none.err;
+}
+
+TEST(Selection, ThinsEvenlyAndTurnsRound) {
+  const Folder data;
+  write_sequence(data / "all", 30);
+  // Of frames 3 .. 27: index i * 25 / 7.
+  const std::vector<int> kept = {3, 6, 10, 13, 17, 20, 24};
+  for (size_t i = 0; i < kept.size(); ++i) {
+    write(data / "forwards/input" / numbered("in", static_cast<int>(i)), frame_at(kept[i]));
+    write(data / "backwards/input" / numbered("in", static_cast<int>(i)),
+          frame_at(kept[kept.size() - 1 - i]));
+  }
+  for (const char* name : {"forwards", "backwards"})
+    write(data / name / "gt/GT_x.png", still_picture());
+  // The paper's amplitude knows which frame is the first.
+  const auto table_of = [&](const char* sequence, Arguments more) {
+    Arguments arguments = {
+        "--dataset", (data / sequence).string(), "--methods", "qdmd,mog2", "--format", "json",
+        "--set",     "amplitude=first-frame"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    auto table = without_seconds(evaluate(arguments).json());
+    for (auto& row : table) row.erase("sequence");
+    return table;
+  };
+  const Arguments thin = {"--start", "3", "--frames", "25", "--thin", "7"};
+  Arguments turned = thin;
+  turned.emplace_back("--reverse");
+  const auto forwards = table_of("all", thin), backwards = table_of("all", turned);
+  EXPECT_EQ(forwards, table_of("forwards", {}));
+  EXPECT_EQ(backwards, table_of("backwards", {}));
+  EXPECT_EQ(backwards, table_of("forwards", {"--reverse"}));
+  EXPECT_NE(forwards, backwards);
+  EXPECT_EQ(forwards[0].at("frames"), 7);
+  // Nothing to thin.
+  EXPECT_EQ(table_of("all", {"--thin", "30"}), table_of("all", {}));
+  EXPECT_EQ(table_of("all", {"--thin", "300"}), table_of("all", {"--thin", "0"}));
 }
 
 // L(t) by the engine itself.

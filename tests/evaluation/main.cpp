@@ -58,6 +58,10 @@ void declare(CLI::App& app, Options& options) {
       ->check(CLI::Range(size_t{0}, kMost));
   app.add_option("--every", options.selection.every, "Take every S-th frame")
       ->check(CLI::Range(size_t{1}, kMost));
+  app.add_option("--thin", options.selection.thin,
+                 "Of the frames that are left, take so many at most, evenly spread (0: all)")
+      ->check(CLI::Range(size_t{0}, kMost));
+  app.add_flag("--reverse", options.selection.reverse, "The last frame comes first");
   app.add_option("--picture", options.picture,
                  "Which L(t) is scored: that of the first, middle (default) or last frame, or the "
                  "median over all. mog2 and knn are scored after the last frame, mean and median "

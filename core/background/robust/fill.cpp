@@ -66,9 +66,9 @@ void pull_row(const uint8_t* HWY_RESTRICT l, const uint8_t* HWY_RESTRICT reach, 
   for (size_t i = 0; i < count; ++i) {
     const int limit = reach[i], away = samples[i] - l[i];
     const int near = away < -limit ? -limit : away > limit ? limit : away;
-    const int drawn = 2 * l[i] + 3 * near + 1;
-    const int level = (drawn < 0 ? 0 : drawn) / 2;
-    samples[i] = static_cast<uint8_t>(level > 255 ? 255 : level);
+    // Halves are rounded away from the background: upwards, they would brighten it.
+    const int level = l[i] + (3 * near + (near > 0) - (near < 0)) / 2;
+    samples[i] = static_cast<uint8_t>(level < 0 ? 0 : level > 255 ? 255 : level);
   }
 }
 

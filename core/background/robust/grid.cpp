@@ -5,8 +5,9 @@
 
 namespace qdmd {
 
-Grid::Grid(int width_, int height_) : width(width_), height(height_) {
-  const int side = std::max(1, static_cast<int>(std::lround(std::min(width, height) / 48.0)));
+Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(height_) {
+  const int side = std::max(
+      1, static_cast<int>(std::lround(std::min(width, height) / static_cast<double>(cells_along))));
   rows = std::max(1, height / side);
   cols = std::max(1, width / side);
 }

@@ -9,13 +9,14 @@
 
 namespace qdmd {
 
-// Cells of about 1/48 of the picture's short side; they cover it without overlap.
+// Cells of about 1/kCellsAlong of the picture's short side; they cover it without overlap.
+constexpr int kCellsAlong = 48;
 struct Grid {
   int width = 0, height = 0;  // pixels
   int rows = 0, cols = 0;     // cells
 
   Grid() = default;
-  Grid(int width, int height);
+  Grid(int width, int height, int cells_along = kCellsAlong);
 
   size_t cells() const { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
   // The first pixel row of a row of cells, the first pixel column of a column.

@@ -12,6 +12,8 @@ constexpr float kAgree = 4;
 constexpr float kDark = 8, kBright = 250;
 // A gain must make this many times as many cells agree, and this share of all cells besides.
 constexpr float kGrowth = 1.3f, kShare = 0.1f;
+// Frames are divided by gains.
+constexpr float kLeastGain = 0.01f;
 // Relative change of light that needs no following: less is a part of the noise.
 constexpr float kStill = 0.03f;
 
@@ -65,9 +67,10 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   for (size_t c = 0; c < kChannels; ++c) {
     near.clear();
     for (const auto& [ratio, cell] : ratios)
-      if (std::abs(ratio - mode) < kNear)
-        near.push_back((frame[c][cell] + 0.5f) / (reference[c][cell] + 0.5f));
-    if (!near.empty()) gain[c] = median(&near);
+      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark)
+        near.push_back(frame[c][cell] / reference[c][cell]);
+    // A channel that is dark everywhere: the light of the others.
+    gain[c] = near.empty() ? std::exp(mode) : std::max(median(&near), kLeastGain);
   }
   return gain;
 }

@@ -8,16 +8,6 @@
 namespace qdmd {
 namespace {
 
-// Frames that the start compares, at most: more cost time and say little new.
-constexpr int kStartFrames = 160;
-
-// A pixel is foreground above this, and above so many spreads of the frames that show its
-// background.
-constexpr int kLeastThreshold = 12;
-constexpr int kSpreads = 4;
-// Samples within one spread of the background, at least so many levels, count in full.
-constexpr int kLeastReach = 2;
-
 // Bytes of filled rows that are combined at once: they stay in the second-level cache.
 constexpr size_t kStripBytes = size_t{1} << 20;
 
@@ -30,12 +20,13 @@ int RobustSolver::chosen_step(int width, int height) {
 }
 
 RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity,
-                           int width, int height, Pool* pool)
+                           int width, int height, Pool* pool, const RobustParameters& parameters)
     : options_(options),
+      parameters_(parameters),
       iterations_(iterations),
       step_(sample_step),
       pool_(pool),
-      grid_(width, height),
+      grid_(width, height, parameters.cells_along),
       cells_(grid_, capacity),
       background_cells_(grid_, 2),
       samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
@@ -63,7 +54,7 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
       std::copy_n(cells_.plane(snapshots.slot(t), c), grid_.cells(), frames.plane(t, c));
   gains_ = light_of(frames, m);
 
-  const int count = std::min(m, kStartFrames);
+  const int count = std::min(m, parameters_.start_frames);
   std::vector<int> frame_of(static_cast<size_t>(count));
   GridFrames chosen(grid_, count);
   for (int i = 0; i < count; ++i) {
@@ -91,9 +82,9 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
   for (size_t p = 0; p < pixels; ++p) {
     // In steps of 1/4 level.
     const int wide = reach_[p];
-    reference_.threshold[p] =
-        static_cast<uint8_t>(std::clamp((kSpreads * wide + 3) / 4, kLeastThreshold, 255));
-    reach_[p] = static_cast<uint8_t>(std::max((wide + 2) / 4, kLeastReach));
+    reference_.threshold[p] = static_cast<uint8_t>(
+        std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
+    reach_[p] = static_cast<uint8_t>(std::max((wide + 2) / 4, parameters_.least_reach));
   }
   reference_.reach.clear();
 }

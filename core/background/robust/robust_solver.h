@@ -9,6 +9,19 @@
 
 namespace qdmd {
 
+// What docs/robust.md measures other values of; users have no say in it.
+struct RobustParameters {
+  int cells_along = kCellsAlong;  // of the grid, along the short side
+  // Frames that the start compares, at most: more cost time and say little new.
+  int start_frames = 160;
+  // A pixel is foreground above least_threshold, and above so many spreads of the frames that show
+  // its background.
+  int least_threshold = 12;
+  int spreads = 4;
+  // Samples within one spread of the background, at least so many levels, count in full.
+  int least_reach = 2;
+};
+
 // The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
 //   start    for each region the frames that show its background (find_stable_frames), and their
 //            median: a background picture and its spread
@@ -23,7 +36,7 @@ class RobustSolver {
   RobustSolver() = default;
   // For windows of `capacity` frames of width x height pixels. `iterations` >= 1.
   RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity, int width,
-               int height, Pool* pool);
+               int height, Pool* pool, const RobustParameters& parameters = {});
 
   // The step that leaves about 120 samples along the short side.
   static int chosen_step(int width, int height);
@@ -44,6 +57,7 @@ class RobustSolver {
   void take_reference(BackgroundModel* model, double t);
 
   DmdOptions options_;
+  RobustParameters parameters_;
   int iterations_ = 1, step_ = 1;
   Pool* pool_ = nullptr;
   Grid grid_;

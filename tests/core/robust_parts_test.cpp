@@ -1,0 +1,453 @@
+// The parts of robust Q-DMD that work on a coarse grid, against the slow and obvious way.
+#include <numeric>
+
+#include "core/background/robust/light.h"
+#include "core/background/robust/patch_density.h"
+#include "core/background/robust/stable_frames.h"
+#include "tests/core/robust_util.h"
+#include "tests/core/simd_targets.h"
+
+namespace qdmd::test {
+namespace {
+
+constexpr double kFloatEpsilon = std::numeric_limits<float>::epsilon();
+
+struct Size {
+  int rows, cols;
+};
+// Fewer cells than a patch, around a patch, and several bands of rows.
+constexpr Size kGrids[] = {{1, 1}, {1, 7},  {2, 3},  {3, 2},   {4, 4},   {5, 5},
+                           {6, 4}, {7, 11}, {16, 9}, {17, 16}, {20, 30}, {33, 6}};
+
+GridFrames random_frames(const Grid& grid, int count, float low, float high, std::mt19937& rng) {
+  GridFrames frames(grid, count);
+  std::uniform_real_distribution<float> level(low, high);
+  for (int t = 0; t < count; ++t)
+    for (int c = 0; c < kChannels; ++c)
+      for (size_t i = 0; i < grid.cells(); ++i) frames.plane(t, c)[i] = level(rng);
+  return frames;
+}
+
+// Pictures of which some are nearly alike, so that densities are neither 0 nor 1.
+GridFrames related_frames(const Grid& grid, int count, std::mt19937& rng) {
+  GridFrames frames = random_frames(grid, count, 0, 255, rng);
+  std::normal_distribution<float> noise(0, 1);
+  for (int t = 0; t < count; ++t) {
+    if (t % 5 == 4) continue;
+    const float sigma = static_cast<float>(t % 7);
+    for (int c = 0; c < kChannels; ++c)
+      for (size_t i = 0; i < grid.cells(); ++i)
+        frames.plane(t, c)[i] = frames.plane(t % 2, c)[i] + sigma * noise(rng);
+  }
+  return frames;
+}
+
+// d of the patches around (y, x), in double.
+double naive_distance(const Grid& grid, const GridFrames& frames, int s, int t, int y, int x) {
+  double sum = 0;
+  int cells = 0;
+  for (int yy = y - kPatchRadius; yy <= y + kPatchRadius; ++yy)
+    for (int xx = x - kPatchRadius; xx <= x + kPatchRadius; ++xx) {
+      if (yy < 0 || yy >= grid.rows || xx < 0 || xx >= grid.cols) continue;
+      const auto i = static_cast<size_t>(yy * grid.cols + xx);
+      double d = 0;
+      for (int c = 0; c < kChannels; ++c)
+        d += std::abs(double{frames.plane(s, c)[i]} - double{frames.plane(t, c)[i]});
+      sum += std::min(d / 3, double{kMostDistance});
+      ++cells;
+    }
+  return sum / cells;
+}
+
+// ---- Cells ----
+
+TEST(Cells, CoverThePictureWithoutOverlap) {
+  for (int width : {1, 2, 47, 48, 71, 72, 73, 352, 1920})
+    for (int height : {1, 3, 48, 71, 240, 1080}) {
+      const Grid grid(width, height);
+      ASSERT_GE(grid.rows, 1);
+      ASSERT_GE(grid.cols, 1);
+      EXPECT_EQ(grid.top(0), 0);
+      EXPECT_EQ(grid.left(0), 0);
+      EXPECT_EQ(grid.top(grid.rows), height);
+      EXPECT_EQ(grid.left(grid.cols), width);
+      for (int row = 0; row < grid.rows; ++row) EXPECT_LT(grid.top(row), grid.top(row + 1));
+      for (int col = 0; col < grid.cols; ++col) EXPECT_LT(grid.left(col), grid.left(col + 1));
+    }
+}
+
+TEST(Cells, MeansAreThoseOfTheirPixels) {
+  std::mt19937 rng(5);
+  for (const auto& [width, height] : {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}}) {
+    const Grid grid(width, height);
+    const auto plane = random_picture(static_cast<size_t>(width * height), rng);
+    std::vector<float> means(grid.cells(), -1);
+    cell_means(grid, plane.data(), means.data());
+    for (int row = 0; row < grid.rows; ++row)
+      for (int col = 0; col < grid.cols; ++col) {
+        double sum = 0;
+        int count = 0;
+        for (int y = grid.top(row); y < grid.top(row + 1); ++y)
+          for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
+            sum += plane[static_cast<size_t>(y * width + x)];
+        // A sum of integers: exact.
+        ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
+                  static_cast<float>(sum / count));
+      }
+  }
+}
+
+// ---- Patches ----
+
+TEST(Patches, DensityIsThatOfTheDoubleLoop) {
+  std::mt19937 rng(6);
+  Pool pool(1);
+  for (const auto& [rows, cols] : kGrids) {
+    SCOPED_TRACE(testing::Message() << rows << " x " << cols);
+    const Grid grid = grid_of(rows, cols);
+    for (int count : {1, 2, 3, 13}) {
+      const GridFrames frames = related_frames(grid, count, rng);
+      std::vector<double> expected(grid.cells() * static_cast<size_t>(count), 0);
+      for (int t = 0; t < count; ++t)
+        for (int s = 0; s < count; ++s)
+          for (int y = 0; y < rows; ++y)
+            for (int x = 0; x < cols; ++x)
+              expected[static_cast<size_t>((t * rows + y) * cols + x)] +=
+                  std::max(0.0, 1 - naive_distance(grid, frames, s, t, y, x) / kSimilar);
+      on_every_target([&] {
+        std::vector<float> density(expected.size(), -1);
+        patch_density(grid, frames, count, &pool, density.data());
+        // 75 differences of levels up to 255 each, of which alike ones are at most kSimilar; then
+        // `count` sums of at most 1.
+        const double bound = (255.0 / double{kSimilar} + 75 + count) * kFloatEpsilon * count;
+        for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(density[i], expected[i], bound);
+      });
+    }
+  }
+}
+
+TEST(Patches, DistanceIsThatOfTheDoubleLoop) {
+  std::mt19937 rng(7);
+  Pool pool(2);
+  constexpr int kCount = 9;
+  for (const auto& [rows, cols] : kGrids) {
+    SCOPED_TRACE(testing::Message() << rows << " x " << cols);
+    const Grid grid = grid_of(rows, cols);
+    const GridFrames frames = related_frames(grid, kCount, rng);
+    std::vector<int> reference(grid.cells());
+    for (int& t : reference) t = static_cast<int>(rng() % kCount);
+    std::vector<float> distance(grid.cells() * kCount, -1);
+    patch_distance(grid, frames, kCount, reference.data(), &pool, distance.data());
+    for (int t = 0; t < kCount; ++t)
+      for (int cell = 0; cell < rows * cols; ++cell) {
+        const int other = reference[static_cast<size_t>(cell)];
+        const double expected = naive_distance(grid, frames, t, other, cell / cols, cell % cols);
+        ASSERT_NEAR(distance[static_cast<size_t>(t * rows * cols + cell)], expected,
+                    100 * kFloatEpsilon * kMostDistance);
+        if (t == other) {
+          ASSERT_EQ(distance[static_cast<size_t>(t * rows * cols + cell)], 0);
+        }
+      }
+  }
+}
+
+TEST(Patches, AnyNumberOfThreadsGivesTheSameBits) {
+  std::mt19937 rng(8);
+  constexpr int kCount = 21;
+  const Grid grid = grid_of(67, 40);
+  const GridFrames frames = related_frames(grid, kCount, rng);
+  std::vector<int> reference(grid.cells());
+  for (int& t : reference) t = static_cast<int>(rng() % kCount);
+  const size_t size = grid.cells() * kCount;
+  on_every_target([&] {
+    std::vector<float> density(size), distance(size), first_density, first_distance;
+    for (int threads : {1, 2, 3, 8}) {
+      Pool pool(threads);
+      patch_density(grid, frames, kCount, &pool, density.data());
+      patch_distance(grid, frames, kCount, reference.data(), &pool, distance.data());
+      if (threads == 1) first_density = density, first_distance = distance;
+      ASSERT_EQ(density, first_density) << threads;
+      ASSERT_EQ(distance, first_distance) << threads;
+    }
+  });
+}
+
+// ---- Light ----
+
+// A textured background of `grid` in each frame's light, with noise and a box of `box` cells'
+// width and height that moves; box 0: none.
+GridFrames lit_frames(const Grid& grid, const std::vector<Gain>& gains, int box, uint32_t seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<float> noise(0, 0.5f);
+  const GridFrames background = random_frames(grid, 1, 30, 160, rng);
+  const int count = static_cast<int>(gains.size());
+  GridFrames frames(grid, count);
+  for (int t = 0; t < count; ++t) {
+    const int x0 = box > 0 ? t * 3 % std::max(1, grid.cols - box) : 0;
+    const int y0 = box > 0 ? t * 2 % std::max(1, grid.rows - box) : 0;
+    for (int y = 0; y < grid.rows; ++y)
+      for (int x = 0; x < grid.cols; ++x) {
+        const auto i = static_cast<size_t>(y * grid.cols + x);
+        const bool in_box = x >= x0 && x < x0 + box && y >= y0 && y < y0 + box;
+        for (int c = 0; c < kChannels; ++c) {
+          const float own =
+              in_box ? 40.0f + 70.0f * static_cast<float>((c + t) % 3) : background.plane(0, c)[i];
+          frames.plane(t, c)[i] =
+              std::clamp(own * gains[static_cast<size_t>(t)][static_cast<size_t>(c)] + noise(rng),
+                         0.0f, 255.0f);
+        }
+      }
+  }
+  return frames;
+}
+
+// Within 1 %, relative to frame 0.
+void expect_gains(const std::vector<Gain>& found, const std::vector<Gain>& truth) {
+  ASSERT_EQ(found.size(), truth.size());
+  for (size_t t = 0; t < truth.size(); ++t)
+    for (size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(found[t][c] / found[0][c] / (truth[t][c] / truth[0][c]), 1, 0.01)
+          << "frame " << t << " channel " << c;
+}
+
+TEST(LightOf, KnownGainsAreFound) {
+  const Grid grid = grid_of(20, 30);
+  for (int box : {0, 6, 10})
+    for (float other : {0.4f, 0.6f, 0.8f, 1.2f, 1.5f}) {
+      SCOPED_TRACE(testing::Message() << "box " << box << " gain " << other);
+      std::vector<Gain> truth(40, kSameLight);
+      // A minority in another light.
+      for (size_t t = 25; t < 37; ++t) truth[t] = {other, other, other};
+      expect_gains(light_of(lit_frames(grid, truth, box, 3), 40), truth);
+      // Half and half: no light is the usual one.
+      for (size_t t = 20; t < 40; ++t) truth[t] = {other, other, other};
+      expect_gains(light_of(lit_frames(grid, truth, box, 4), 40), truth);
+    }
+}
+
+TEST(LightOf, ColoursOfLightAreFound) {
+  const Grid grid = grid_of(24, 24);
+  std::vector<Gain> truth(30, kSameLight);
+  for (size_t t = 18; t < 30; ++t) truth[t] = {0.85f, 0.75f, 0.65f};
+  expect_gains(light_of(lit_frames(grid, truth, 6, 9), 30), truth);
+}
+
+// Frames near the middle light are left to refine_gain(): they agree with it within its tolerance.
+TEST(LightOf, AFadeIsFollowed) {
+  const Grid grid = grid_of(20, 30);
+  std::vector<Gain> truth;
+  for (int t = 0; t < 60; ++t) {
+    const float gain = 1 - 0.4f * static_cast<float>(t) / 59;
+    truth.push_back({gain, gain, gain});
+  }
+  const auto found = light_of(lit_frames(grid, truth, 7, 11), 60);
+  // The light of what was left as it is.
+  double base = 0;
+  int unlit = 0;
+  for (size_t t = 0; t < truth.size(); ++t)
+    if (!is_lit(found[t])) base += truth[t][1], ++unlit;
+  base = unlit > 0 ? base / unlit : truth[30][1] / found[30][1];
+  for (size_t t = 0; t < truth.size(); ++t)
+    EXPECT_NEAR(found[t][1] * base / truth[t][1], 1, is_lit(found[t]) ? 0.03 : 0.06) << t;
+}
+
+TEST(LightOf, SmallChangesAreNoise) {
+  const Grid grid = grid_of(20, 30);
+  std::mt19937 rng(12);
+  std::normal_distribution<float> flicker(0, 0.01f);
+  std::vector<Gain> truth(30);
+  for (Gain& gain : truth) gain.fill(1 + flicker(rng));
+  for (const Gain& gain : light_of(lit_frames(grid, truth, 6, 13), 30)) EXPECT_FALSE(is_lit(gain));
+}
+
+TEST(LightOf, WhatMovesIsNoLight) {
+  std::mt19937 rng(14);
+  const Grid grid = grid_of(20, 30);
+  for (float high : {120.0f, 250.0f})
+    for (const Gain& gain : light_of(random_frames(grid, 30, 10, high, rng), 30))
+      EXPECT_FALSE(is_lit(gain));
+  // A wide texture that pans.
+  const Grid wide = grid_of(20, 300);
+  const GridFrames texture = random_frames(wide, 1, 20, 230, rng);
+  GridFrames pan(grid, 40);
+  for (int t = 0; t < 40; ++t)
+    for (int c = 0; c < kChannels; ++c)
+      for (int y = 0; y < 20; ++y)
+        std::copy_n(texture.plane(0, c) + y * 300 + 5 * t, 30, pan.plane(t, c) + y * 30);
+  for (const Gain& gain : light_of(pan, 40)) EXPECT_FALSE(is_lit(gain));
+}
+
+TEST(LightOf, NothingToSeeIsTheSameLight) {
+  const Grid grid = grid_of(4, 4);
+  for (float level : {0.0f, 5.0f, 255.0f})
+    for (int count : {1, 2, 9}) {
+      GridFrames frames(grid, count);
+      for (int t = 0; t < count; ++t)
+        for (int c = 0; c < kChannels; ++c) std::fill_n(frames.plane(t, c), grid.cells(), level);
+      for (const Gain& gain : light_of(frames, count)) EXPECT_EQ(gain, kSameLight);
+    }
+}
+
+TEST(SettleLight, TheUsualLightBecomesOne) {
+  std::vector<Gain> gains(10, Gain{1.2f, 1.1f, 1.3f});
+  for (size_t t = 6; t < 10; ++t) gains[t] = {0.6f, 0.55f, 0.65f};
+  gains[1] = {1.22f, 1.12f, 1.32f};  // noise
+  settle_light(&gains);
+  for (size_t t = 0; t < 6; ++t) EXPECT_EQ(gains[t], kSameLight);
+  for (size_t t = 6; t < 10; ++t)
+    for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(gains[t][c], 0.5f, 1e-5);
+}
+
+TEST(SettleLight, WithoutAUsualLightNothingIsDone) {
+  std::vector<Gain> gains;
+  for (int t = 0; t < 20; ++t)
+    gains.push_back(Gain{1, 1, 1}), gains.back().fill(0.5f + 0.1f * static_cast<float>(t));
+  const auto before = gains;
+  settle_light(&gains);
+  EXPECT_EQ(gains, before);
+}
+
+// The edge is soft: a change a little above the limit must not jump.
+TEST(SettleLight, IsMonotonicAndContinuous) {
+  float last = 1;
+  for (int k = 0; k <= 200; ++k) {
+    std::vector<Gain> gains(9, kSameLight);
+    gains[8].fill(1 + 0.001f * static_cast<float>(k));
+    settle_light(&gains);
+    EXPECT_GE(gains[8][0], last);
+    EXPECT_LT(gains[8][0], last + 0.004f);
+    EXPECT_LE(gains[8][0], 1 + 0.001f * static_cast<float>(k) + 1e-6f);
+    last = gains[8][0];
+  }
+  EXPECT_NEAR(last, 1.2f, 1e-5);
+}
+
+// ---- Stable frames ----
+
+// A scene of cells into which boxes can be put.
+struct CellScene {
+  Grid grid = grid_of(24, 32);
+  int count;
+  GridFrames frames;
+
+  // A smooth background with a little noise.
+  explicit CellScene(int count_, float sigma = 0.5f, uint32_t seed = 21)
+      : count(count_), frames(grid, count_) {
+    std::mt19937 rng(seed);
+    std::normal_distribution<float> noise(0, sigma);
+    for (int t = 0; t < count; ++t)
+      for (int c = 0; c < kChannels; ++c)
+        for (int y = 0; y < grid.rows; ++y)
+          for (int x = 0; x < grid.cols; ++x)
+            frames.plane(t, c)[y * grid.cols + x] = background(c, y, x) + noise(rng);
+  }
+  static float background(int c, int y, int x) {
+    return 80 + 20 * static_cast<float>(c) + static_cast<float>(y) + 0.5f * static_cast<float>(x);
+  }
+  void box(int t, int top, int left, int size, float level) {
+    for (int c = 0; c < kChannels; ++c)
+      for (int y = std::max(0, top); y < std::min(grid.rows, top + size); ++y)
+        for (int x = std::max(0, left); x < std::min(grid.cols, left + size); ++x)
+          frames.plane(t, c)[y * grid.cols + x] = level + 9 * static_cast<float>(c);
+  }
+  StableFrames stable() const {
+    Pool pool(2);
+    return find_stable_frames(grid, frames, count, &pool);
+  }
+  // Every frame chosen for a cell shows its background there, and some frame is chosen.
+  void expect_background(const StableFrames& stable, int margin = 0) const {
+    for (int y = margin; y < grid.rows - margin; ++y)
+      for (int x = margin; x < grid.cols - margin; ++x) {
+        const auto& chosen = stable.of_cell[static_cast<size_t>(y * grid.cols + x)];
+        ASSERT_FALSE(chosen.empty());
+        ASSERT_TRUE(std::is_sorted(chosen.begin(), chosen.end()));
+        for (int t : chosen)
+          ASSERT_NEAR(frames.plane(t, 0)[y * grid.cols + x], background(0, y, x), 5)
+              << "cell " << y << " " << x << " frame " << t;
+      }
+  }
+};
+
+TEST(StableFramesOf, NothingMoves) {
+  const CellScene scene(40);
+  const StableFrames stable = scene.stable();
+  scene.expect_background(stable);
+  for (const auto& chosen : stable.of_cell) EXPECT_EQ(chosen.size(), 40u);
+}
+
+TEST(StableFramesOf, AMovingBoxIsLeftOut) {
+  CellScene scene(60);
+  for (int t = 0; t < 60; ++t) scene.box(t, 2 + t % 16, t * 3 % 28, 7, 200);
+  const StableFrames stable = scene.stable();
+  scene.expect_background(stable);
+  for (const auto& chosen : stable.of_cell) EXPECT_GT(chosen.size(), 20u);
+}
+
+// The background is seen in less than a third of the frames, everything else is seen once.
+TEST(StableFramesOf, TheLookThatFramesShareIsTheBackground) {
+  CellScene scene(50);
+  std::mt19937 rng(23);
+  std::uniform_real_distribution<float> level(0, 255);
+  for (int t = 0; t < 50; ++t)
+    if (t % 10 >= 3)
+      for (int y = 0; y < 24; y += 4)
+        for (int x = 0; x < 32; x += 4) scene.box(t, y, x, 4, level(rng));
+  scene.expect_background(scene.stable());
+}
+
+// It stands still for most of the window; its contour gives it away.
+TEST(StableFramesOf, WhatStandsStillShowsByItsContour) {
+  for (double share : {0.55, 0.7, 0.85}) {
+    for (bool at_the_end : {false, true}) {
+      CellScene scene(100);
+      const int standing = static_cast<int>(100 * share);
+      for (int t = 0; t < 100; ++t) {
+        const bool there = at_the_end ? t >= 100 - standing : t < standing;
+        if (there) scene.box(t, 8, 12, 8, 190);
+      }
+      SCOPED_TRACE(testing::Message() << share << (at_the_end ? " at the end" : " at the start"));
+      scene.expect_background(scene.stable());
+    }
+  }
+}
+
+// A part of the background with a contour of its own stays, whatever passes before it.
+TEST(StableFramesOf, TheBackgroundMayHaveContours) {
+  CellScene scene(80);
+  for (int t = 0; t < 80; ++t) {
+    scene.box(t, 6, 6, 9, 30);
+    scene.box(t, 10 + t % 5, (5 * t) % 30, 6, 220);
+  }
+  const StableFrames stable = scene.stable();
+  for (int y = 8; y < 13; ++y)
+    for (int x = 8; x < 13; ++x)
+      for (int t : stable.of_cell[static_cast<size_t>(y * 32 + x)])
+        EXPECT_NEAR(scene.frames.plane(t, 0)[y * 32 + x], 30, 1) << y << " " << x;
+}
+
+TEST(StableFramesOf, AnyWindowAndGridHasSome) {
+  std::mt19937 rng(25);
+  Pool pool(3);
+  for (const auto& [rows, cols] : kGrids)
+    for (int count : {1, 2, 3, 17}) {
+      const Grid grid = grid_of(rows, cols);
+      for (bool same : {false, true}) {
+        const GridFrames frames =
+            same ? GridFrames(grid, count) : random_frames(grid, count, 0, 255, rng);
+        const StableFrames stable = find_stable_frames(grid, frames, count, &pool);
+        ASSERT_EQ(stable.of_cell.size(), grid.cells());
+        for (const auto& chosen : stable.of_cell) {
+          ASSERT_FALSE(chosen.empty());
+          ASSERT_GE(chosen.front(), 0);
+          ASSERT_LT(chosen.back(), count);
+          ASSERT_TRUE(std::is_sorted(chosen.begin(), chosen.end()));
+          if (same) {
+            ASSERT_EQ(chosen.size(), static_cast<size_t>(count));
+          }
+        }
+      }
+    }
+}
+
+}  // namespace
+}  // namespace qdmd::test

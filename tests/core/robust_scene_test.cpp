@@ -1,0 +1,128 @@
+// method=robust on simulated scenes and on shaken pictures of real size, against the truth.
+#include "core/scene/scene.h"
+#include "tests/core/robust_util.h"
+
+namespace qdmd::test {
+namespace {
+
+constexpr int kWidth = 160, kHeight = 120, kFrames = 100;
+
+// A scene's frames and true backgrounds.
+struct Footage {
+  Clip frames{0, 0}, truth{0, 0};
+
+  Footage(const char* text, int width, int height, int count, uint64_t seed = 17) {
+    scene::SceneOptions options;
+    options.width = width;
+    options.height = height;
+    options.seed = seed;
+    options.frames_per_second = 5;  // things take their time
+    scene::Scene scene(options, text);
+    const auto pixels = static_cast<size_t>(width * height);
+    frames = truth = Clip(pixels, static_cast<size_t>(count));
+    for (int t = 0; t < count; ++t) {
+      scene.render(t, scene::kFrame | scene::kTruth);
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t p = 0; p < pixels; ++p) {
+          frames.at(static_cast<size_t>(t), c, p) = scene.frame().samples[3 * p + c];
+          truth.at(static_cast<size_t>(t), c, p) = scene.background().samples[3 * p + c];
+        }
+    }
+  }
+};
+
+struct Errors {
+  double mean = 0, worst = 0, median = 0;  // per frame; of the temporal median: mean
+};
+
+Errors errors_of(const char* text, int iterations = 2) {
+  const Footage footage(text, kWidth, kHeight, kFrames);
+  const auto found = run_engine(footage.frames, kWidth, kHeight, robust_of(kFrames, iterations));
+  const auto median = temporal_median(footage.frames);
+  Errors errors;
+  for (size_t t = 0; t < found.size(); ++t) {
+    const double error = mean_error(found[t], footage.truth.frames[t]);
+    errors.mean += error / kFrames;
+    errors.worst = std::max(errors.worst, error);
+    errors.median += mean_error(median, footage.truth.frames[t]) / kFrames;
+  }
+  return errors;
+}
+
+// The acceptance line: the light falls by 40 % over the window, and somebody walks.
+TEST(RobustScenes, AFadeIsFollowed) {
+  for (const char* text : {"fade=0.4:duration=20", "fade=0.4:duration=20,noise=2"}) {
+    for (int iterations : {1, 2}) EXPECT_LT(errors_of(text, iterations).worst, 2) << text;
+    EXPECT_GT(errors_of(text).median, 10) << text;
+  }
+}
+
+TEST(RobustScenes, ALightSwitchIsNoBlend) {
+  const Errors errors = errors_of("light-switch,noise=2");
+  EXPECT_LT(errors.worst, 2);
+}
+
+// What a camera on a wall sees; each near the truth, and no worse than the median.
+TEST(RobustScenes, AreNoWorseThanTheMedian) {
+  for (const char* text : {"default", "noise=3", "low-rate=5", "stop=8", "abandon", "remove",
+                           "shadow", "camouflage", "bootstrap", "exposure", "flicker"}) {
+    const Errors errors = errors_of(text);
+    EXPECT_LT(errors.mean, std::max(2.0, errors.median)) << text;
+  }
+}
+
+// ---- Camera shake ----
+
+double gradient_energy(const std::vector<uint8_t>& picture, int width, int height) {
+  const size_t pixels = picture.size() / 3;
+  const auto row = static_cast<size_t>(width);
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 3; y < height - 3; ++y)
+      for (int x = 3; x < width - 3; ++x) {
+        const size_t p = c * pixels + static_cast<size_t>(y) * row + static_cast<size_t>(x);
+        sum += std::pow(picture[p + 1] - picture[p - 1], 2) +
+               std::pow(picture[p + row] - picture[p - row], 2);
+      }
+  return sum;
+}
+
+// The street without anybody, seen through a camera that jumps by whole pixels, and a walker.
+TEST(RobustScenes, AShakingCameraIsAsSharpAsTheMedian) {
+  constexpr int kMargin = 4, kW = 320, kH = 240;
+  const Footage street("default", kW + 2 * kMargin, kH + 2 * kMargin, 1);
+  const auto shifted = [&](int dx, int dy) {
+    std::vector<uint8_t> picture(size_t{3} * kW * kH);
+    for (size_t c = 0; c < 3; ++c)
+      for (int y = 0; y < kH; ++y)
+        for (int x = 0; x < kW; ++x)
+          picture[c * kW * kH + static_cast<size_t>(y * kW + x)] = street.truth.at(
+              0, c,
+              static_cast<size_t>((y + dy + kMargin) * (kW + 2 * kMargin) + x + dx + kMargin));
+    return picture;
+  };
+  for (int reach : {1, 2}) {
+    std::mt19937 rng(55);
+    std::normal_distribution<double> noise(0, 1);
+    Clip clip(size_t{kW} * kH, 80);
+    for (size_t t = 0; t < 80; ++t) {
+      const auto span = static_cast<uint32_t>(2 * reach + 1);
+      const int dx = static_cast<int>(rng() % span) - reach;
+      const int dy = static_cast<int>(rng() % span) - reach;
+      clip.frames[t] = shifted(dx, dy);
+      for (int y = 60; y < 180; ++y)
+        for (int x = static_cast<int>(5 * t) - 50; x < static_cast<int>(5 * t); ++x)
+          if (x >= 0 && x < kW)
+            for (size_t c = 0; c < 3; ++c)
+              clip.at(t, c, static_cast<size_t>(y * kW + x)) = static_cast<uint8_t>(200 - 40 * c);
+      for (auto& sample : clip.frames[t])
+        sample = static_cast<uint8_t>(std::lround(std::clamp(sample + noise(rng), 0.0, 255.0)));
+    }
+    const double median = gradient_energy(temporal_median(clip), kW, kH);
+    const double robust = gradient_energy(run_engine(clip, kW, kH, robust_of(80))[40], kW, kH);
+    EXPECT_GE(robust, median) << reach << " pixels";
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test
