@@ -180,7 +180,9 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   StableFrames result;
   result.of_cell.resize(cells);
   std::vector<float> sorted(static_cast<size_t>(count));
-  const auto nearest = static_cast<ptrdiff_t>(kNearest * (count - 1));
+  // The nearest of all is the frame itself, whose distance is zero.
+  const auto nearest =
+      std::min<ptrdiff_t>(count - 1, std::max(1, static_cast<int>(kNearest * (count - 1))));
   for (size_t cell = 0; cell < cells; ++cell) {
     for (int t = 0; t < count; ++t)
       sorted[static_cast<size_t>(t)] = distance[static_cast<size_t>(t) * cells + cell];
