@@ -8,7 +8,7 @@ namespace qdmd {
 namespace {
 
 // The coarsest step that moved the background of no sequence of docs/sampling.md by more than 0.1
-// level: there is none above 1 at any rank.
+// level: there is none above 1.
 constexpr int kChosenStep = 1;
 
 }  // namespace
