@@ -16,9 +16,10 @@ struct SolveReport {
   DmdSummary dmd;
   ForegroundStatistics foreground;
   int window_frames = 0;
-  int sample_step = 1;    // the decomposition saw every k-th pixel in x and y
-  double gram_time = 0;   // seconds in the Gram matrix since the solve before
-  double solve_time = 0;  // seconds in the decomposition
+  int sample_step = 1;  // the decomposition saw every k-th pixel in x and y
+  // Seconds in the Gram matrix since the solve before, and in the decomposition, which for
+  // Method::robust has all of it.
+  double gram_time = 0, solve_time = 0;
 };
 
 // The steps of a solve: add_to_gram() for groups of frames, each in slices of pixels; decompose();

@@ -53,14 +53,20 @@ TEST_F(RobustSequences, MeanOfGreyErrors) {
   EXPECT_GT(mean_age(whole(), "median"), 8);
 }
 
-// What is wanted is no worse than the median, or below 2. 511, where trees wave, is 2.4 % above it
-// (docs/robust.md).
-TEST_F(RobustSequences, NoneIsMuchWorseThanTheMedian) {
+// 511, where trees wave, is the one that misses this (docs/robust.md): it is held where it is, and
+// the test asks for its name to be taken out once it no longer misses.
+TEST_F(RobustSequences, NoneButOneIsWorseThanTheMedian) {
   for (const auto& row : whole()) {
     if (row.at("method") != "robust") continue;
     const std::string sequence = row.at("sequence");
     const double median = row_of(whole(), sequence, "median").at("AGE").get<double>();
-    EXPECT_LE(row.at("AGE").get<double>(), std::max(1.03 * median, 2.0)) << sequence;
+    const double age = row.at("AGE").get<double>();
+    if (sequence == "SBMnet/511") {
+      EXPECT_GT(age, std::max(median, 2.0)) << "511 holds now: take the exception out";
+      EXPECT_LE(age, 2.25);
+    } else {
+      EXPECT_LE(age, std::max(median, 2.0)) << sequence;
+    }
   }
 }
 

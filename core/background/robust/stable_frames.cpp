@@ -86,18 +86,17 @@ class Regions {
 class Contour {
  public:
   Contour(const Grid& grid, const Regions& regions, int region, const std::vector<int>& cells) {
-    const auto note = [&](int before, int middle, int after) {
-      if (regions.in(region, before) == regions.in(region, after)) return;
-      (void)middle;
-      pairs_.emplace_back(before, after);
+    const auto note = [&](int before, int after) {
+      if (regions.in(region, before) != regions.in(region, after))
+        pairs_.emplace_back(before, after);
     };
     // Each pair of cells two apart, of which one is inside, is met from its inside one.
     for (int cell : cells) {
       const int y = cell / grid.cols, x = cell % grid.cols;
-      if (y + 2 < grid.rows) note(cell, cell + grid.cols, cell + 2 * grid.cols);
-      if (y >= 2) note(cell - 2 * grid.cols, cell - grid.cols, cell);
-      if (x + 2 < grid.cols) note(cell, cell + 1, cell + 2);
-      if (x >= 2) note(cell - 2, cell - 1, cell);
+      if (y + 2 < grid.rows) note(cell, cell + 2 * grid.cols);
+      if (y >= 2) note(cell - 2 * grid.cols, cell);
+      if (x + 2 < grid.cols) note(cell, cell + 2);
+      if (x >= 2) note(cell - 2, cell);
     }
   }
   size_t size() const { return pairs_.size(); }
@@ -180,9 +179,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   StableFrames result;
   result.of_cell.resize(cells);
   std::vector<float> sorted(static_cast<size_t>(count));
-  // The nearest of all is the frame itself, whose distance is zero.
-  const auto nearest =
-      std::min<ptrdiff_t>(count - 1, std::max(1, static_cast<int>(kNearest * (count - 1))));
+  const auto nearest = static_cast<ptrdiff_t>(kNearest * (count - 1));
   for (size_t cell = 0; cell < cells; ++cell) {
     for (int t = 0; t < count; ++t)
       sorted[static_cast<size_t>(t)] = distance[static_cast<size_t>(t) * cells + cell];
