@@ -15,61 +15,119 @@ HWY_BEFORE_NAMESPACE();
 namespace qdmd {
 namespace HWY_NAMESPACE {
 
-// Plain loops over one row, which the compiler makes vectors of for each instruction set.
+namespace hn = hwy::HWY_NAMESPACE;
 
-// The quaternion norm of x - l, rounded down, at most 255.
-void norm_row(const uint8_t* HWY_RESTRICT xr, const uint8_t* HWY_RESTRICT xg,
-              const uint8_t* HWY_RESTRICT xb, const uint8_t* HWY_RESTRICT lr,
-              const uint8_t* HWY_RESTRICT lg, const uint8_t* HWY_RESTRICT lb, size_t count,
-              uint8_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i) {
-    const int r = xr[i] - lr[i], g = xg[i] - lg[i], b = xb[i] - lb[i];
-    const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
-    out[i] = static_cast<uint8_t>(static_cast<int>(norm < 255.0f ? norm : 255.0f));
-  }
+// Vectors of at most 64 samples: runs are multiples of that.
+using Bytes = hn::CappedTag<uint8_t, 64>;
+
+// keep[i] = 0 where bit i is set, else 255; masked[i] counts the former. `count`: a multiple of 64.
+void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
+                 uint16_t* HWY_RESTRICT masked) {
+  const Bytes d;
+  const auto ones = hn::Set(d, 255);
+  for (size_t i = 0; i < count; i += hn::Lanes(d))
+    hn::StoreU(hn::IfThenZeroElse(hn::LoadMaskBits(d, bits + i / 8), ones), d, keep + i);
+  for (size_t i = 0; i < count; ++i) masked[i] = static_cast<uint16_t>(masked[i] + (keep[i] == 0));
 }
 
-void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
-               uint8_t* HWY_RESTRICT out) {
+// `from` in unit light where kept, else 0.
+void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep, size_t count,
+              float factor, uint8_t* HWY_RESTRICT out) {
+  if (factor == 1) {
+    for (size_t i = 0; i < count; ++i) out[i] = from[i] & keep[i];
+    return;
+  }
   for (size_t i = 0; i < count; ++i) {
     const float level = static_cast<float>(from[i]) * factor + 0.5f;
-    out[i] = static_cast<uint8_t>(static_cast<int>(level < 255.0f ? level : 255.0f));
+    out[i] = static_cast<uint8_t>(static_cast<int>(level < 255.0f ? level : 255.0f)) & keep[i];
   }
 }
 
-// padded: two samples before the row's first and two after its last.
-void sum_columns(const uint8_t* HWY_RESTRICT padded, size_t count, uint16_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i)
-    out[i] = static_cast<uint16_t>(padded[i] + padded[i + 1] + padded[i + 2] + padded[i + 3] +
-                                   padded[i + 4]);
+// How many of `planes` rows of samples, `stride` apart, are below `limit`, by lanes. Samples are
+// counted in bytes, as far as these can count.
+template <bool kEqual, class V>
+HWY_INLINE void count_below(const uint8_t* samples, size_t stride, size_t planes, V limit,
+                            uint16_t* below) {
+  const Bytes d;
+  std::memset(below, 0, hn::Lanes(d) * sizeof(*below));
+  HWY_ALIGN uint8_t part[64];
+  for (size_t t = 0; t < planes;) {
+    const size_t end = std::min(planes, t + 255);
+    auto count = hn::Zero(d);
+    for (; t < end; ++t) {
+      const auto x = hn::LoadU(d, samples + t * stride);
+      const auto is_below = kEqual ? hn::Not(hn::Gt(x, limit)) : hn::Lt(x, limit);
+      count = hn::Sub(count, hn::VecFromMask(d, is_below));
+    }
+    hn::Store(count, d, part);
+    for (size_t i = 0; i < hn::Lanes(d); ++i) below[i] = static_cast<uint16_t>(below[i] + part[i]);
+  }
 }
 
-void sum_rows(const uint16_t* const* rows, size_t count, uint16_t* HWY_RESTRICT out) {
-  const uint16_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4];
-  for (size_t i = 0; i < count; ++i)
-    out[i] = static_cast<uint16_t>(a[i] + b[i] + c[i] + d[i] + e[i]);
+// The median of each pixel's samples that are not masked, the mean of the middle two rounded down
+// where their number is even. samples: `planes` rows, `stride` apart, 0 where masked. level: what
+// it is where all are masked. count: a multiple of 64. The median's bits are found from the highest
+// down: a bit is set where no more samples lie below than half.
+void median_row(const uint8_t* samples, size_t stride, size_t planes,
+                const uint16_t* HWY_RESTRICT masked, size_t count, uint8_t* HWY_RESTRICT level) {
+  const Bytes d;
+  const size_t lanes = hn::Lanes(d);
+  HWY_ALIGN uint8_t median[64], candidate[64], upper[64];
+  HWY_ALIGN uint16_t below[64], rank[64];
+  const auto all = static_cast<uint16_t>(planes);
+  for (size_t first = 0; first < count; first += lanes) {
+    const uint8_t* x = samples + first;
+    const uint16_t* zeros = masked + first;
+    for (size_t i = 0; i < lanes; ++i) {
+      median[i] = 0;
+      rank[i] = static_cast<uint16_t>(zeros[i] + std::max(all - zeros[i] - 1, 0) / 2);
+    }
+    for (int bit = 128; bit > 0; bit /= 2) {
+      for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<uint8_t>(median[i] | bit);
+      count_below<false>(x, stride, planes, hn::Load(d, candidate), below);
+      for (size_t i = 0; i < lanes; ++i) median[i] = below[i] <= rank[i] ? candidate[i] : median[i];
+    }
+    // The upper of the middle two is the same, or the least sample above.
+    const auto lower = hn::Load(d, median);
+    count_below<true>(x, stride, planes, lower, below);
+    auto least = hn::Set(d, 255);
+    for (size_t t = 0; t < planes; ++t) {
+      const auto sample = hn::LoadU(d, x + t * stride);
+      least = hn::IfThenElse(hn::Gt(sample, lower), hn::Min(least, sample), least);
+    }
+    hn::Store(least, d, upper);
+    for (size_t i = 0; i < lanes; ++i) {
+      if (zeros[i] == all) continue;
+      const int number = all - zeros[i];
+      const bool next = number % 2 == 0 && below[i] == zeros[i] + number / 2;
+      level[first + i] = static_cast<uint8_t>((median[i] + (next ? upper[i] : median[i])) / 2);
+    }
+  }
 }
 
-// The frame's sample where sums are at most 25 threshold, else the background's.
-void choose_row(const uint16_t* HWY_RESTRICT sums, const uint8_t* HWY_RESTRICT threshold,
-                const uint8_t* HWY_RESTRICT x, const uint8_t* HWY_RESTRICT l, size_t count,
-                uint8_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i)
-    out[i] = sums[i] > static_cast<uint16_t>(25 * threshold[i]) ? l[i] : x[i];
+// Samples that are not kept become the level; others are drawn to it by one step of Huber's
+// estimate. count: a multiple of 64.
+void draw_row(const uint8_t* HWY_RESTRICT level, const uint8_t* HWY_RESTRICT reach,
+              const uint8_t* HWY_RESTRICT keep, size_t count, uint8_t* HWY_RESTRICT samples) {
+  const Bytes d;
+  const auto zero = hn::Zero(d);
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto x = hn::LoadU(d, samples + i), l = hn::LoadU(d, level + i);
+    const auto above = hn::SaturatedSub(x, l), below = hn::SaturatedSub(l, x);
+    const auto limit = hn::And(hn::LoadU(d, reach + i), hn::LoadU(d, keep + i));
+    const auto up = hn::Min(above, limit), down = hn::Min(below, limit);
+    // Halves are rounded away from the level: upwards, they would brighten it.
+    const auto more = hn::Add(up, hn::AverageRound(up, zero));
+    const auto less = hn::Add(down, hn::AverageRound(down, zero));
+    hn::StoreU(hn::SaturatedSub(hn::SaturatedAdd(l, more), less), d, samples + i);
+  }
 }
 
-// Samples farther than `reach` from the background are drawn to it, all are weighted a half more:
-// one step of Huber's estimate of the mean (Robust Statistics, 1981), where most of the samples are
-// within reach.
-void pull_row(const uint8_t* HWY_RESTRICT l, const uint8_t* HWY_RESTRICT reach, size_t count,
+// Samples that are not kept become the level.
+void fill_row(const uint8_t* HWY_RESTRICT level, const uint8_t* HWY_RESTRICT keep, size_t count,
               uint8_t* HWY_RESTRICT samples) {
-  for (size_t i = 0; i < count; ++i) {
-    const int limit = reach[i], away = samples[i] - l[i];
-    const int near = away < -limit ? -limit : away > limit ? limit : away;
-    // Halves are rounded away from the background: upwards, they would brighten it.
-    const int level = l[i] + (3 * near + (near > 0) - (near < 0)) / 2;
-    samples[i] = static_cast<uint8_t>(level < 0 ? 0 : level > 255 ? 255 : level);
-  }
+  for (size_t i = 0; i < count; ++i)
+    samples[i] = static_cast<uint8_t>(samples[i] | (level[i] & static_cast<uint8_t>(~keep[i])));
 }
 
 }  // namespace HWY_NAMESPACE
@@ -80,158 +138,87 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
-HWY_EXPORT(norm_row);
-HWY_EXPORT(scale_row);
-HWY_EXPORT(sum_columns);
-HWY_EXPORT(sum_rows);
-HWY_EXPORT(choose_row);
-HWY_EXPORT(pull_row);
+HWY_EXPORT(expand_bits);
+HWY_EXPORT(take_row);
+HWY_EXPORT(median_row);
+HWY_EXPORT(draw_row);
+HWY_EXPORT(fill_row);
 
-constexpr int kReach = 2;  // pixels around one that judge it with it
-constexpr int kRows = 2 * kReach + 1;
+constexpr size_t kUnit = 64;
+// Of samples and what is kept of them.
+constexpr size_t kRunBytes = size_t{1} << 19;
 
-// The sums over kRows samples of a row, the border's samples standing for those outside.
-// padded: room for width + 2 kReach.
-void sum_row(const uint8_t* row, size_t width, uint8_t* padded, uint16_t* out) {
-  std::memset(padded, row[0], kReach);
-  std::memcpy(padded + kReach, row, width);
-  std::memset(padded + kReach + width, row[width - 1], kReach);
-  HWY_DYNAMIC_DISPATCH(sum_columns)(padded, width, out);
-}
-
-// A ring of the sums of the last kRows rows.
-class RowSums {
- public:
-  RowSums(uint16_t* memory, size_t width) : memory_(memory), width_(width) {}
-  uint16_t* of(int row) { return memory_ + static_cast<size_t>(row % kRows) * width_; }
-  // Of the rows around `row`, as far as there are any.
-  void around(int row, int height, uint16_t* out) {
-    const uint16_t* rows[kRows];
-    for (int i = 0; i < kRows; ++i) rows[i] = of(std::clamp(row + i - kReach, 0, height - 1));
-    HWY_DYNAMIC_DISPATCH(sum_rows)(rows, width_, out);
-  }
-
- private:
-  uint16_t* memory_;
-  size_t width_;
-};
+size_t round_up(size_t count) { return (count + kUnit - 1) / kUnit * kUnit; }
 
 }  // namespace
 
-void fill_rows(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-               int first_row, int row_count, uint8_t* const out[3], std::vector<uint8_t>* scratch) {
-  const auto width = static_cast<size_t>(reference.width);
-  const bool lit = is_lit(gain);
-  scratch->resize(width * (2 * (kRows + 1) + 5) + 2 * kReach + 64);
-  auto* sums = reinterpret_cast<uint16_t*>(scratch->data());
-  RowSums ring(sums + width, width);
-  uint8_t* norm = scratch->data() + 2 * width * (kRows + 1);
-  uint8_t* padded = norm + width;
-  uint8_t* lit_rows[3] = {padded + width + 2 * kReach, padded + 2 * width + 2 * kReach,
-                          padded + 3 * width + 2 * kReach};
-  int next = std::max(0, first_row - kReach);
-  for (int row = first_row; row < first_row + row_count; ++row) {
-    for (; next <= std::min(reference.height - 1, row + kReach); ++next) {
-      const size_t start = static_cast<size_t>(next) * width;
-      const uint8_t* l[3];
-      for (size_t c = 0; c < 3; ++c) {
-        l[c] = reference.level[c].data() + start;
-        if (!lit) continue;
-        HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, gain[c], lit_rows[c]);
-        l[c] = lit_rows[c];
-      }
-      HWY_DYNAMIC_DISPATCH(norm_row)
-      (x[0] + start, x[1] + start, x[2] + start, l[0], l[1], l[2], width, norm);
-      sum_row(norm, width, padded, ring.of(next));
-    }
-    ring.around(row, reference.height, sums);
-    const size_t start = static_cast<size_t>(row) * width;
-    for (size_t c = 0; c < 3; ++c) {
-      uint8_t* to = out[c] + static_cast<size_t>(row - first_row) * width;
-      const uint8_t* from = x[c] + start;
-      const uint8_t* level = reference.level[c].data() + start;
-      if (lit) {
-        HWY_DYNAMIC_DISPATCH(scale_row)(from, width, 1 / gain[c], lit_rows[c]);
-        from = lit_rows[c];
-      }
-      HWY_DYNAMIC_DISPATCH(choose_row)
-      (sums, reference.threshold.data() + start, from, level, width, to);
-      if (!reference.reach.empty())
-        HWY_DYNAMIC_DISPATCH(pull_row)(level, reference.reach.data() + start, width, to);
-    }
-  }
+WindowMask::WindowMask(int capacity, size_t pixels)
+    // Vectors of bits are read whole, also at the end.
+    : stride_(mask_bytes(pixels)), bits_(stride_ * static_cast<size_t>(capacity) + kUnit) {}
+
+uint64_t WindowMask::bytes(int capacity, size_t pixels) {
+  return uint64_t{mask_bytes(pixels)} * static_cast<uint64_t>(capacity);
 }
 
-void fill_samples(const Reference& reference, const uint8_t* const x[3], const Gain& gain, int step,
-                  uint8_t* const out[3]) {
+Filler::Filler(int snapshots) {
+  const auto m = static_cast<size_t>(std::max(snapshots, 1));
+  run_ = std::clamp(kRunBytes / (m * (kChannels + 1)) / kUnit * kUnit, kUnit, size_t{4096});
+  keep_.resize(m * run_);
+  // One row more for the level.
+  samples_.resize((m * kChannels + 1) * run_);
+  masked_.resize(run_);
+  for (size_t k = 0; k < m * kChannels; ++k) planes_.push_back(samples_.data() + k * run_);
+}
+
+const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                                   const WindowMask& mask, const Reference& reference,
+                                   const uint8_t* reach, size_t first, size_t count) {
+  const auto m = static_cast<size_t>(snapshots.size());
+  const size_t padded = round_up(count);
+  std::fill_n(masked_.data(), padded, uint16_t{0});
+  for (size_t t = 0; t < m; ++t) {
+    uint8_t* keep = keep_.data() + t * run_;
+    const int snapshot = static_cast<int>(t);
+    HWY_DYNAMIC_DISPATCH(expand_bits)(mask.of(snapshot) + first / 8, padded, keep, masked_.data());
+    for (size_t c = 0; c < kChannels; ++c) {
+      const float gain = gains[t][c];
+      // Planes are padded like runs.
+      HWY_DYNAMIC_DISPATCH(take_row)
+      (snapshots.plane(snapshot, static_cast<int>(c)) + first, keep, padded,
+       gain == 1 ? 1 : 1 / gain, samples_.data() + (kChannels * t + c) * run_);
+    }
+  }
+  uint8_t* level = samples_.data() + m * kChannels * run_;
+  for (size_t c = 0; c < kChannels; ++c) {
+    std::memcpy(level, reference.level[c].data() + first, count);
+    std::memset(level + count, 0, padded - count);
+    HWY_DYNAMIC_DISPATCH(median_row)
+    (samples_.data() + c * run_, kChannels * run_, m, masked_.data(), padded, level);
+    for (size_t t = 0; t < m; ++t) {
+      const uint8_t* keep = keep_.data() + t * run_;
+      uint8_t* samples = samples_.data() + (kChannels * t + c) * run_;
+      if (reach)
+        HWY_DYNAMIC_DISPATCH(draw_row)(level, reach + first, keep, padded, samples);
+      else
+        HWY_DYNAMIC_DISPATCH(fill_row)(level, keep, padded, samples);
+    }
+  }
+  return planes_.data();
+}
+
+void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, int step, uint8_t* const out[3]) {
   size_t sample = 0;
   for (int row = 0; row < reference.height; row += step)
     for (int col = 0; col < reference.width; col += step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
-      float unit[3], squared = 0;
       for (size_t c = 0; c < 3; ++c) {
-        const float level = reference.level[c][p];
-        const float away = static_cast<float>(x[c][p]) - level * gain[c];
-        squared += away * away;
-        unit[c] = static_cast<float>(x[c][p]) / gain[c];
+        const float unit = static_cast<float>(x[c][p]) / gain[c];
+        out[c][sample] = is_masked(bits, p) ? reference.level[c][p]
+                                            : static_cast<uint8_t>(std::min(255.0f, unit + 0.5f));
       }
-      const float limit = reference.threshold[p];
-      const bool foreground = squared > limit * limit;
-      for (size_t c = 0; c < 3; ++c)
-        out[c][sample] = foreground ? reference.level[c][p]
-                                    : static_cast<uint8_t>(std::min(255.0f, unit[c] + 0.5f));
     }
-}
-
-Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-                 int step) {
-  // Where less fits, the gain would be of what moves.
-  constexpr double kLeastShare = 0.1;
-  Gain refined = gain;
-  for (int round = 0; round < 2; ++round) {
-    double product[3] = {0, 0, 0}, square[3] = {0, 0, 0};
-    size_t fit = 0, seen = 0;
-    for (int row = 0; row < reference.height; row += step)
-      for (int col = 0; col < reference.width; col += step, ++seen) {
-        const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
-                       static_cast<size_t>(col);
-        float squared = 0;
-        int brightest = 0;
-        for (size_t c = 0; c < 3; ++c) {
-          const float away =
-              static_cast<float>(x[c][p]) - static_cast<float>(reference.level[c][p]) * refined[c];
-          squared += away * away;
-          brightest = std::max<int>(brightest, x[c][p]);
-        }
-        const float limit = reference.threshold[p];
-        if (squared >= limit * limit || brightest >= 250) continue;
-        ++fit;
-        for (size_t c = 0; c < 3; ++c) {
-          product[c] += x[c][p] * reference.level[c][p];
-          square[c] += reference.level[c][p] * reference.level[c][p];
-        }
-      }
-    if (static_cast<double>(fit) < kLeastShare * static_cast<double>(seen)) break;
-    for (size_t c = 0; c < 3; ++c)
-      if (product[c] > 0) refined[c] = static_cast<float>(product[c] / square[c]);
-  }
-  return refined;
-}
-
-void blur(const uint8_t* plane, int width, int height, uint8_t* out) {
-  const auto w = static_cast<size_t>(width);
-  std::vector<uint16_t> memory(w * (kRows + 1));
-  std::vector<uint8_t> padded(w + 2 * kReach);
-  RowSums ring(memory.data() + w, w);
-  int next = 0;
-  for (int row = 0; row < height; ++row) {
-    for (; next <= std::min(height - 1, row + kReach); ++next)
-      sum_row(plane + static_cast<size_t>(next) * w, w, padded.data(), ring.of(next));
-    ring.around(row, height, memory.data());
-    for (size_t x = 0; x < w; ++x)
-      out[static_cast<size_t>(row) * w + x] = static_cast<uint8_t>((memory[x] + 12) / 25);
-  }
 }
 
 }  // namespace qdmd

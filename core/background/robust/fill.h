@@ -3,39 +3,57 @@
 
 #include <vector>
 
-#include "core/background/robust/light.h"
+#include "core/background/robust/mask.h"
 
 namespace qdmd {
 
-// A background picture and how far frames may lie from it; planes of width * height samples.
-struct Reference {
-  int width = 0, height = 0;
-  std::vector<uint8_t> level[kChannels];  // in unit light
-  // Quaternion norm in levels: the mean residual of the 5 x 5 pixels around, above which a pixel is
-  // foreground.
-  std::vector<uint8_t> threshold;
-  // What a sample may lie from the background before it is drawn nearer; empty: any distance.
-  std::vector<uint8_t> reach;
+// The masks of a window's snapshots, one after another.
+class WindowMask {
+ public:
+  WindowMask() = default;
+  WindowMask(int capacity, size_t pixels);
+  static uint64_t bytes(int capacity, size_t pixels);
 
-  size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
+  uint8_t* of(int snapshot) { return bits_.data() + static_cast<size_t>(snapshot) * stride_; }
+  const uint8_t* of(int snapshot) const {
+    return bits_.data() + static_cast<size_t>(snapshot) * stride_;
+  }
+
+ private:
+  size_t stride_ = 0;
+  std::vector<uint8_t> bits_;
 };
 
-// Rows first_row .. first_row + row_count - 1 of a frame, in unit light, with the reference's
-// levels where the frame is foreground. x: the frame's planes; out: row_count * width samples a
-// channel; scratch is resized as needed and can serve many calls.
-void fill_rows(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-               int first_row, int row_count, uint8_t* const out[3], std::vector<uint8_t>* scratch);
+// Fills runs of pixels of all snapshots. One for each thread.
+class Filler {
+ public:
+  // Runs of up to run() pixels, a multiple of 64: they stay in the second-level cache.
+  explicit Filler(int snapshots);
+  Filler(Filler&&) = default;  // not copied: planes_ points into samples_
+  size_t run() const { return run_; }
 
-// The same for every step-th pixel in x and y, judged by its own residual alone: for inner
-// products. out: ceil(width / step) * ceil(height / step) samples a channel.
-void fill_samples(const Reference& reference, const uint8_t* const x[3], const Gain& gain, int step,
-                  uint8_t* const out[3]);
+  // Pixels first .. first + count - 1 in unit light; `first` is a multiple of 64. Where a snapshot
+  // is masked, it becomes the median of the pixel's other snapshots, or the reference's level where
+  // there are none. Others are drawn to that median where they lie farther from it than `reach`,
+  // and all are weighted a half more: one step of Huber's estimate of the mean (Robust Statistics,
+  // 1981). reach: width * height samples, at most kMostReach, or null: any distance, no weight.
+  // Returns a plane of samples for each channel of each snapshot, readable up to the next multiple
+  // of 64; they are good until the next call.
+  const uint8_t* const* fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                             const WindowMask& mask, const Reference& reference,
+                             const uint8_t* reach, size_t first, size_t count);
+  static constexpr int kMostReach = 100;
 
-// The frame's gain over the reference by least squares on the sampled pixels that fit it under
-// `gain`; `gain` itself where too few do.
-Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain, int step);
+ private:
+  size_t run_;
+  std::vector<uint8_t> samples_, keep_;
+  std::vector<const uint8_t*> planes_;
+  std::vector<uint16_t> masked_;  // snapshots, of each pixel
+};
 
-// out[p] = the mean of the 5 x 5 samples around p; the border's samples stand for those outside.
-void blur(const uint8_t* plane, int width, int height, uint8_t* out);
+// Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked:
+// for inner products. out: ceil(width / step) * ceil(height / step) samples a channel.
+void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, int step, uint8_t* const out[3]);
 
 }  // namespace qdmd

@@ -8,9 +8,6 @@
 namespace qdmd {
 namespace {
 
-// Bytes of filled rows that are combined at once: they stay in the second-level cache.
-constexpr size_t kStripBytes = size_t{1} << 20;
-
 int sampled(int size, int step) { return (size + step - 1) / step; }
 
 }  // namespace
@@ -29,6 +26,7 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
       grid_(width, height, parameters.cells_along),
       cells_(grid_, capacity),
       background_cells_(grid_, 2),
+      mask_(capacity, static_cast<size_t>(width) * static_cast<size_t>(height)),
       samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
                              static_cast<size_t>(sampled(height, sample_step))),
       gram_(capacity, pool) {
@@ -75,7 +73,8 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
     background[c] = reference_.level[c].data();
   }
   std::vector<uint8_t> spread(pixels);
-  reach_.resize(pixels);
+  // Runs read to their end.
+  reach_.resize(snapshots.plane_size());
   median_picture(snapshots, grid_, stable, frame_of, gains_, pool_, background, spread.data());
   blur(spread.data(), reference_.width, reference_.height, reach_.data());
   reference_.threshold.resize(pixels);
@@ -84,9 +83,19 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
     const int wide = reach_[p];
     reference_.threshold[p] = static_cast<uint8_t>(
         std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
-    reach_[p] = static_cast<uint8_t>(std::max((wide + 2) / 4, parameters_.least_reach));
+    reach_[p] = static_cast<uint8_t>(
+        std::clamp((wide + 4) / 8, parameters_.least_reach, Filler::kMostReach));
   }
-  reference_.reach.clear();
+}
+
+void RobustSolver::find_foreground(const SnapshotRange& snapshots) {
+  std::vector<std::vector<uint8_t>> scratch(pool_->threads());
+  pool_->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
+    const int t = static_cast<int>(part);
+    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                 snapshots.plane(t, 2)};
+    foreground_mask(reference_, x, gains_[part], mask_.of(t), &scratch[worker]);
+  });
 }
 
 Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
@@ -97,43 +106,25 @@ Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
     const int slot = samples_.append();
     uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                              samples_.plane(slot, 2)};
-    fill_samples(reference_, x, gains_[static_cast<size_t>(t)], step_, out);
+    fill_samples(reference_, mask_.of(t), x, gains_[static_cast<size_t>(t)], step_, out);
   }
   gram_.add_newest(samples_, samples_.size());
   return decompose(samples_, gram_.matrix(samples_), options_);
 }
 
-// The modes' pictures from filled frames, strip by strip.
+// The modes' pictures from filled frames, run by run.
 void RobustSolver::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
-  const size_t planes = static_cast<size_t>(snapshots.size()) * kChannels;
-  const auto width = static_cast<size_t>(reference_.width);
-  const int rows = static_cast<int>(std::clamp<size_t>(kStripBytes / (planes * width), 4, 64));
-  const size_t padded = (static_cast<size_t>(rows) * width + 63) / 64 * 64;
-  struct Strip {
-    std::vector<uint8_t> samples, scratch;
-    std::vector<const uint8_t*> planes;
-  };
-  std::vector<Strip> strips(pool_->threads());
-  for (Strip& strip : strips) {
-    strip.samples.resize(planes * padded);
-    strip.scratch.reserve(width * 32 + 128);
-    for (size_t k = 0; k < planes; ++k) strip.planes.push_back(strip.samples.data() + k * padded);
-  }
-  const auto parts = static_cast<size_t>((reference_.height + rows - 1) / rows);
-  pool_->run(parts, [&](size_t part, size_t worker) {
-    Strip& strip = strips[worker];
-    const int first = static_cast<int>(part) * rows;
-    const int count = std::min(rows, reference_.height - first);
-    for (int t = 0; t < snapshots.size(); ++t) {
-      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                   snapshots.plane(t, 2)};
-      uint8_t* const out[3] = {strip.samples.data() + (3 * static_cast<size_t>(t) + 0) * padded,
-                               strip.samples.data() + (3 * static_cast<size_t>(t) + 1) * padded,
-                               strip.samples.data() + (3 * static_cast<size_t>(t) + 2) * padded};
-      fill_rows(reference_, x, gains_[static_cast<size_t>(t)], first, count, out, &strip.scratch);
-    }
-    model->build_from(strip.planes.data(), static_cast<size_t>(first) * width,
-                      static_cast<size_t>(count) * width);
+  std::vector<Filler> fillers;
+  for (size_t i = 0; i < pool_->threads(); ++i) fillers.emplace_back(snapshots.size());
+  // With several modes L(t) may follow more than the light, which drawing samples nearer would
+  // stop.
+  const uint8_t* reach = options_.rank == 1 ? reach_.data() : nullptr;
+  const size_t pixels = reference_.pixels(), run = fillers[0].run();
+  pool_->run((pixels + run - 1) / run, [&](size_t part, size_t worker) {
+    const size_t first = part * run, count = std::min(run, pixels - first);
+    model->build_from(
+        fillers[worker].fill(snapshots, gains_, mask_, reference_, reach, first, count), first,
+        count);
   });
 }
 
@@ -153,20 +144,20 @@ DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, BackgroundModel* 
   DmdSummary summary;
   for (int iteration = 0; iteration < iterations_; ++iteration) {
     if (std::any_of(gains_.begin(), gains_.end(), is_lit)) {
-      for (int t = 0; t < snapshots.size(); ++t) {
+      pool_->run(gains_.size(), [&](size_t part) {
+        const int t = static_cast<int>(part);
         const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
                                      snapshots.plane(t, 2)};
-        Gain& gain = gains_[static_cast<size_t>(t)];
-        gain = refine_gain(reference_, x, gain, step_);
-      }
+        gains_[part] = refine_gain(reference_, x, gains_[part], step_);
+      });
       settle_light(&gains_);
     }
+    find_foreground(snapshots);
     const Decomposition decomposition = decompose_filled(snapshots);
     summary = decomposition.summary;
     model->begin(snapshots, decomposition.background, true);
     combine(snapshots, model);
     take_reference(model, snapshots.size() / 2);
-    reference_.reach = reach_;
   }
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),

@@ -18,7 +18,7 @@ struct RobustParameters {
   // its background.
   int least_threshold = 12;
   int spreads = 4;
-  // Samples within one spread of the background, at least so many levels, count in full.
+  // Samples within half a spread of the background, at least so many levels, count in full.
   int least_reach = 2;
 };
 
@@ -52,6 +52,7 @@ class RobustSolver {
 
  private:
   void start(const SnapshotRange& snapshots);
+  void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
   void combine(const SnapshotRange& snapshots, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
@@ -67,6 +68,7 @@ class RobustSolver {
   Reference reference_;
   std::vector<uint8_t> reach_;
   std::vector<Gain> gains_;  // of the snapshots
+  WindowMask mask_;          // of the snapshots
   Window samples_;           // filled
   SlidingGram gram_;
 };
