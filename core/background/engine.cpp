@@ -79,6 +79,7 @@ void Engine::flush() {
   if (side_) live_.stop();
   window_.clear();
   solver_.clear();
+  solver_.forget();
   live_.restart(false);
   pending_ = ready_ = not_in_gram_ = 0;
   has_model_ = start_new_window_ = frozen_ = false;

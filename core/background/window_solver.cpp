@@ -51,11 +51,13 @@ WindowSolver::WindowSolver(const DmdOptions& options, int iterations, int capaci
 void WindowSolver::clear() {
   samples_.clear();
   gram_seconds_ = 0;
+  appended_ = 0;
 }
 
 void WindowSolver::append(const Window& window) {
   const int slot = window.slot(window.size() - 1);
   if (robust()) robust_.append(window, slot);
+  ++appended_;
   if (robust() || sample_step_ == 1) return;
   samples_.append();
   for (int c = 0; c < kChannels; ++c) {
@@ -91,6 +93,8 @@ void WindowSolver::decompose(const SnapshotRange& snapshots) {
   decomposed_.gram_time = gram_seconds_;
   gram_seconds_ = 0;
   snapshots_ = snapshots;
+  fresh_ = std::min(1.0f, static_cast<float>(appended_) / static_cast<float>(snapshots.size()));
+  appended_ = 0;
   decomposed_.solve_time = seconds_since(start);
 }
 
@@ -99,7 +103,7 @@ void WindowSolver::build(int index, int count) {
     next_report_ = decomposed_;
     if (robust()) {
       const auto start = std::chrono::steady_clock::now();
-      next_report_.dmd = robust_.solve(*snapshots_, &models_[next()]);
+      next_report_.dmd = robust_.solve(*snapshots_, fresh_, &models_[next()]);
       next_report_.solve_time = seconds_since(start);
     } else {
       models_[next()].begin(*snapshots_, background_, keep_pictures_);

@@ -41,6 +41,8 @@ class WindowSolver {
   void append(const Window& window);
   // Forgets all frames.
   void clear();
+  // Forgets what earlier windows showed of the background.
+  void forget() { robust_.forget(); }
 
   // Slice `index` of `count` of the inner products of the newest `frames` snapshots of `span` with
   // all of `span`. Slices of a group come in order.
@@ -77,6 +79,8 @@ class WindowSolver {
   SlidingGram gram_;
   RobustSolver robust_;
   double gram_seconds_ = 0;
+  int appended_ = 0;  // frames since the newest decompose()
+  float fresh_ = 1;   // their share of its snapshots
   // Of the newest decompose().
   std::optional<SnapshotRange> snapshots_;
   TemporalModel background_;

@@ -45,6 +45,12 @@ std::vector<Variant> variants() {
   vary("rank", &Setting::rank, {2, 3});
   vary("sample-step", &Setting::step, {1, 4, 8});
   vary("window-size", &Setting::window, {200, 100, 50, 25});
+  for (int size : {100, 50, 25}) {
+    Variant variant{"window-size " + std::to_string(size) + ", each alone", {}};
+    variant.setting.window = size;
+    variant.setting.parameters.earlier_share = 0;
+    all.push_back(variant);
+  }
   vary("start frames", inner(&RobustParameters::start_frames), {40, 80, 300});
   vary("cells along the short side", inner(&RobustParameters::cells_along), {24, 96});
   vary("least threshold", inner(&RobustParameters::least_threshold), {6, 24});
@@ -84,10 +90,10 @@ Outcome measure(const Clip& clip, const Setting& setting, Pool* pool) {
   const int count = static_cast<int>(clip.frames.size());
   const int capacity = std::min(count, setting.window), windows = count / capacity;
   Outcome outcome;
+  RobustSolver solver(options, setting.iterations, step, capacity, size.width, size.height, pool,
+                      setting.parameters);
   for (int w = 0; w < windows; ++w) {
     Window window(capacity, static_cast<size_t>(size.area()));
-    RobustSolver solver(options, setting.iterations, step, capacity, size.width, size.height, pool,
-                        setting.parameters);
     const auto start = std::chrono::steady_clock::now();
     for (int t = 0; t < capacity; ++t) {
       const int slot = window.append();
@@ -98,7 +104,7 @@ Outcome measure(const Clip& clip, const Setting& setting, Pool* pool) {
       solver.append(window, slot);
     }
     BackgroundModel model;
-    solver.solve(window, &model);
+    solver.solve(window, 1, &model);
     outcome.seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const cv::Mat picture = middle_of(&model, capacity, size);

@@ -28,8 +28,9 @@ struct Grid {
 class GridFrames {
  public:
   GridFrames() = default;
-  GridFrames(const Grid& grid, int count)
-      : cells_(grid.cells()), levels_(cells_ * kChannels * static_cast<size_t>(count)) {}
+  GridFrames(size_t cells, int count)
+      : cells_(cells), levels_(cells * kChannels * static_cast<size_t>(count)) {}
+  GridFrames(const Grid& grid, int count) : GridFrames(grid.cells(), count) {}
 
   size_t cells() const { return cells_; }
   float* plane(int frame, int channel) { return levels_.data() + offset(frame, channel); }

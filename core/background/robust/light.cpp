@@ -88,24 +88,6 @@ Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, in
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
 
-// Each cell's median over some frames, in unit light.
-GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
-  constexpr int kMost = 64;
-  const int used = std::min(count, kMost);
-  GridFrames result = frames;
-  std::vector<float> levels(static_cast<size_t>(used));
-  for (int c = 0; c < kChannels; ++c)
-    for (size_t cell = 0; cell < frames.cells(); ++cell) {
-      for (int i = 0; i < used; ++i) {
-        const int t = static_cast<int>(int64_t{i} * count / used);
-        levels[static_cast<size_t>(i)] =
-            frames.plane(t, c)[cell] / gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
-      }
-      result.plane(0, c)[cell] = median(&levels);
-    }
-  return result;
-}
-
 float brightness(const Gain& gain) { return (gain[0] + gain[1] + gain[2]) / 3; }
 
 // 1 for small changes, with a soft edge.
@@ -118,6 +100,23 @@ Gain without_noise(const Gain& gain) {
 }
 
 }  // namespace
+
+GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
+  constexpr int kMost = 64;
+  const int used = std::min(count, kMost);
+  GridFrames result(frames.cells(), 1);
+  std::vector<float> levels(static_cast<size_t>(used));
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t cell = 0; cell < frames.cells(); ++cell) {
+      for (int i = 0; i < used; ++i) {
+        const int t = static_cast<int>(int64_t{i} * count / used);
+        levels[static_cast<size_t>(i)] =
+            frames.plane(t, c)[cell] / gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
+      }
+      result.plane(0, c)[cell] = median(&levels);
+    }
+  return result;
+}
 
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference) {
   return without_noise(gain_over(frames, frame, background, reference));

@@ -13,6 +13,9 @@ namespace qdmd {
 // Small changes around the light of most frames are left out: they are noise.
 std::vector<Gain> light_of(const GridFrames& frames, int count);
 
+// Each cell's median over frames 0 .. count - 1 (64 of them at most) in unit light, as frame 0.
+GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains);
+
 // The gain of one frame over picture `reference` of `background`, both on the same grid; 1 where it
 // does not explain what they differ in, or is small.
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference);

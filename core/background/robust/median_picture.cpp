@@ -109,23 +109,24 @@ constexpr int kBlockPixels = 128;
 
 }  // namespace
 
-void median_picture(const SnapshotRange& snapshots, const Grid& grid, const StableFrames& stable,
-                    const std::vector<int>& frame_of, const std::vector<Gain>& gains, Pool* pool,
-                    uint8_t* const background[3], uint8_t* spread) {
+void median_picture(const Grid& grid, const StableFrames& stable,
+                    const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
+                    uint8_t* spread) {
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
     for (int col = 0; col < grid.cols; ++col) {
-      const auto& frames =
+      const auto& shown =
           stable.of_cell[part * static_cast<size_t>(grid.cols) + static_cast<size_t>(col)];
-      const size_t known = frames.size(), count = std::min<size_t>(known, kMedianFrames);
+      const size_t known = shown.size(), count = std::min<size_t>(known, kMedianFrames);
       const uint8_t* planes[kChannels * kMedianFrames];
       float inverse[kChannels * kMedianFrames];
       for (size_t i = 0; i < count; ++i) {
-        const int t = frame_of[static_cast<size_t>(frames[(2 * i + 1) * known / (2 * count)])];
+        const LitPicture& frame =
+            frames[static_cast<size_t>(shown[(2 * i + 1) * known / (2 * count)])];
         for (size_t c = 0; c < kChannels; ++c) {
-          planes[kChannels * i + c] = snapshots.plane(t, static_cast<int>(c));
-          inverse[kChannels * i + c] = 1 / gains[static_cast<size_t>(t)][c];
+          planes[kChannels * i + c] = frame.plane[c];
+          inverse[kChannels * i + c] = 1 / frame.gain[c];
         }
       }
       const int left = grid.left(col), right = grid.left(col + 1);

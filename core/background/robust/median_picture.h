@@ -9,11 +9,16 @@ namespace qdmd {
 // Frames of a pixel's median, at most.
 constexpr int kMedianFrames = 31;
 
+struct LitPicture {
+  const uint8_t* plane[kChannels];
+  Gain gain;
+};
+
 // background[c][p]: the median over the frames of p's cell, in unit light; more than kMedianFrames
 // are thinned evenly. spread[p]: the median of their quaternion distances from it, in steps of 1/4
-// level, up to 255. frame_of[i]: the snapshot that stable frame i is; gains: of all snapshots.
-void median_picture(const SnapshotRange& snapshots, const Grid& grid, const StableFrames& stable,
-                    const std::vector<int>& frame_of, const std::vector<Gain>& gains, Pool* pool,
-                    uint8_t* const background[3], uint8_t* spread);
+// level, up to 255. frames[i]: what stable frame i is.
+void median_picture(const Grid& grid, const StableFrames& stable,
+                    const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
+                    uint8_t* spread);
 
 }  // namespace qdmd

@@ -26,6 +26,7 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
       grid_(width, height, parameters.cells_along),
       cells_(grid_, capacity),
       background_cells_(grid_, 2),
+      earlier_(grid_),
       mask_(capacity, static_cast<size_t>(width) * static_cast<size_t>(height)),
       samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
                              static_cast<size_t>(sampled(height, sample_step))),
@@ -53,18 +54,32 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
   gains_ = light_of(frames, m);
 
   const int count = std::min(m, parameters_.start_frames);
-  std::vector<int> frame_of(static_cast<size_t>(count));
-  GridFrames chosen(grid_, count);
-  for (int i = 0; i < count; ++i) {
-    const int t = static_cast<int>(int64_t{i} * m / count);
-    frame_of[static_cast<size_t>(i)] = t;
+  std::vector<LitPicture> pictures(static_cast<size_t>(count));
+  GridFrames chosen(grid_, count + 1);
+  const auto choose = [&](const GridFrames& from, int frame, int i, const LitPicture& picture) {
+    pictures[static_cast<size_t>(i)] = picture;
     for (int c = 0; c < kChannels; ++c) {
-      const float inverse = 1 / gains_[static_cast<size_t>(t)][static_cast<size_t>(c)];
-      std::transform(frames.plane(t, c), frames.plane(t, c) + grid_.cells(), chosen.plane(i, c),
+      const float inverse = 1 / picture.gain[static_cast<size_t>(c)];
+      std::transform(from.plane(frame, c), from.plane(frame, c) + grid_.cells(), chosen.plane(i, c),
                      [inverse](float level) { return level * inverse; });
     }
+  };
+  for (int i = 0; i < count; ++i) {
+    const int t = static_cast<int>(int64_t{i} * m / count);
+    choose(frames, t, i,
+           {{snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
+            gains_[static_cast<size_t>(t)]});
   }
-  const StableFrames stable = find_stable_frames(grid_, chosen, count, pool_);
+  Recollection recollection;
+  if (earlier_.known()) {
+    const GridFrames here = median_frame(frames, m, gains_);
+    pictures.emplace_back();
+    choose(earlier_.cells(), 0, count, earlier_.picture(light_over(earlier_.cells(), 0, here, 0)));
+    recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
+  }
+  stable_ =
+      find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr, pool_);
+  start_frames_ = count;
 
   const size_t pixels = reference_.pixels();
   uint8_t* background[kChannels];
@@ -75,8 +90,10 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
   std::vector<uint8_t> spread(pixels);
   // Runs read to their end.
   reach_.resize(snapshots.plane_size());
-  median_picture(snapshots, grid_, stable, frame_of, gains_, pool_, background, spread.data());
+  median_picture(grid_, stable_, pictures, pool_, background, spread.data());
+  recall_spread(&spread);
   blur(spread.data(), reference_.width, reference_.height, reach_.data());
+  spread_.assign(reach_.begin(), reach_.begin() + static_cast<ptrdiff_t>(pixels));
   reference_.threshold.resize(pixels);
   for (size_t p = 0; p < pixels; ++p) {
     // In steps of 1/4 level.
@@ -86,6 +103,22 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
     reach_[p] = static_cast<uint8_t>(
         std::clamp((wide + 4) / 8, parameters_.least_reach, Filler::kMostReach));
   }
+}
+
+// One picture has no spread: the one that an earlier window found.
+void RobustSolver::recall_spread(std::vector<uint8_t>* spread) const {
+  if (!earlier_.known()) return;
+  for (int row = 0; row < grid_.rows; ++row)
+    for (int col = 0; col < grid_.cols; ++col) {
+      const auto& frames = stable_.of_cell[static_cast<size_t>(row * grid_.cols + col)];
+      if (frames.size() > 1 || frames.front() != start_frames_) continue;
+      for (int y = grid_.top(row); y < grid_.top(row + 1); ++y) {
+        const ptrdiff_t start = static_cast<ptrdiff_t>(y) * grid_.width;
+        std::copy(earlier_.spread().begin() + start + grid_.left(col),
+                  earlier_.spread().begin() + start + grid_.left(col + 1),
+                  spread->begin() + start + grid_.left(col));
+      }
+    }
 }
 
 void RobustSolver::find_foreground(const SnapshotRange& snapshots) {
@@ -139,7 +172,8 @@ void RobustSolver::take_reference(BackgroundModel* model, double t) {
   }
 }
 
-DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, BackgroundModel* model) {
+DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, float fresh,
+                               BackgroundModel* model) {
   start(snapshots);
   DmdSummary summary;
   for (int iteration = 0; iteration < iterations_; ++iteration) {
@@ -162,6 +196,8 @@ DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, BackgroundModel* 
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
                background_cells_.plane(1 - published_, c));
+  if (parameters_.earlier_share > 0)
+    earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh);
   model->set_gains(gains_);
   return summary;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/background/background_model.h"
+#include "core/background/robust/earlier.h"
 #include "core/background/robust/fill.h"
 #include "core/background/robust/stable_frames.h"
 #include "core/dmd/decompose.h"
@@ -20,6 +21,9 @@ struct RobustParameters {
   int spreads = 4;
   // Samples within half a spread of the background, at least so many levels, count in full.
   int least_reach = 2;
+  // What an earlier window's background counts at most, in start frames of this one; 0: windows
+  // know nothing of each other.
+  float earlier_share = 0.5f;
 };
 
 // The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
@@ -47,11 +51,15 @@ class RobustSolver {
   Gain light(int slot) const { return light_over(cells_, slot, background_cells_, published_); }
   // From now on light() compares with the newest solve. Not while one runs.
   void publish() { published_ = 1 - published_; }
-  // Makes `model` the window's background.
-  DmdSummary solve(const SnapshotRange& snapshots, BackgroundModel* model);
+  // Forgets what earlier windows showed.
+  void forget() { earlier_.forget(); }
+  // Makes `model` the window's background. fresh: the share of the snapshots that no solve before
+  // had.
+  DmdSummary solve(const SnapshotRange& snapshots, float fresh, BackgroundModel* model);
 
  private:
   void start(const SnapshotRange& snapshots);
+  void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
   void combine(const SnapshotRange& snapshots, BackgroundModel* model);
@@ -65,7 +73,12 @@ class RobustSolver {
   GridFrames cells_;             // by slot
   GridFrames background_cells_;  // of the published and the newest solve, in unit light
   int published_ = 0;
+  Earlier earlier_;
+  // Of the newest start: frames that it compared, and what it found.
+  int start_frames_ = 0;
+  StableFrames stable_;
   Reference reference_;
+  std::vector<uint8_t> spread_;  // quarters of a level, mean of 5 x 5
   std::vector<uint8_t> reach_;
   std::vector<Gain> gains_;  // of the snapshots
   WindowMask mask_;          // of the snapshots

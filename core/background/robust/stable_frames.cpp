@@ -17,6 +17,8 @@ constexpr int kLeastCells = 6;
 constexpr float kLeastSupport = 0.04f;
 constexpr float kMargin = 1.25f;
 constexpr size_t kLeastContour = 8;
+// The share of cells that must show what an earlier window did: people seldom hide more.
+constexpr float kLeastSeen = 0.15f;
 // Frames that propose regions.
 constexpr int kProposals = 64;
 
@@ -127,10 +129,12 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
   Regions regions(grid);
   std::vector<uint8_t> differs(cells);
   const int proposals = std::min(count, kProposals);
+  const int looks = static_cast<int>(density.size() / cells);
   for (int sweep = 0; sweep < 2; ++sweep) {
     bool changed = false;
-    for (int i = 0; i < proposals; ++i) {
-      const int t = static_cast<int>(int64_t{i} * count / proposals);
+    for (int i = 0; i < proposals + looks - count; ++i) {
+      const int t =
+          i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
       const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
       for (size_t cell = 0; cell < cells; ++cell) {
         float d = 0;
@@ -160,32 +164,69 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
   }
 }
 
+// Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
+// too little of it is seen in any frame: the camera moved, or the scene is another.
+bool add_recollection(const Grid& grid, const GridFrames& frames, int count,
+                      const Recollection& earlier, Pool* pool, std::vector<float>* density) {
+  const size_t cells = grid.cells();
+  std::vector<float> alike(density->size());
+  patch_distance(grid, frames, count, std::vector<int>(cells, count).data(), pool, alike.data());
+  for (float& a : alike) a = std::max(0.0f, 1 - a / kSimilar);
+  float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
+  std::fill_n(of_earlier, cells, 0.0f);
+  for (int t = 0; t < count; ++t)
+    for (size_t cell = 0; cell < cells; ++cell)
+      of_earlier[cell] += alike[static_cast<size_t>(t) * cells + cell];
+  const auto seen = std::count_if(of_earlier, of_earlier + cells,
+                                  [](float frames_alike) { return frames_alike > 0; });
+  if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
+  for (int t = 0; t < count; ++t)
+    for (size_t cell = 0; cell < cells; ++cell) {
+      const size_t at = static_cast<size_t>(t) * cells + cell;
+      (*density)[at] += earlier.weight[cell] * alike[at];
+    }
+  for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += earlier.weight[cell];
+  return true;
+}
+
 }  // namespace
 
-StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count, Pool* pool) {
+StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
+                                const Recollection* earlier, Pool* pool) {
   const size_t cells = grid.cells();
-  std::vector<float> density(cells * static_cast<size_t>(count));
+  std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
   patch_density(grid, frames, count, pool, density.data());
-  std::vector<int> from(cells, 0);
-  for (size_t cell = 0; cell < cells; ++cell)
-    for (int t = 1; t < count; ++t)
+  if (earlier && !add_recollection(grid, frames, count, *earlier, pool, &density)) {
+    earlier = nullptr;
+    density.resize(cells * static_cast<size_t>(count));
+  }
+  const int looks = count + (earlier ? 1 : 0);
+  std::vector<int> from(cells);
+  for (size_t cell = 0; cell < cells; ++cell) {
+    from[cell] = 0;
+    for (int t = 1; t < looks; ++t)
       if (density[static_cast<size_t>(t) * cells + cell] >
           density[static_cast<size_t>(from[cell]) * cells + cell])
         from[cell] = t;
+  }
   compare_contours(grid, frames, count, density, &from);
 
   std::vector<float>& distance = density;
-  patch_distance(grid, frames, count, from.data(), pool, distance.data());
+  patch_distance(grid, frames, looks, from.data(), pool, distance.data());
   StableFrames result;
   result.of_cell.resize(cells);
+  result.limit.resize(cells);
   std::vector<float> sorted(static_cast<size_t>(count));
   const auto nearest = static_cast<ptrdiff_t>(kNearest * (count - 1));
   for (size_t cell = 0; cell < cells; ++cell) {
     for (int t = 0; t < count; ++t)
       sorted[static_cast<size_t>(t)] = distance[static_cast<size_t>(t) * cells + cell];
     std::nth_element(sorted.begin(), sorted.begin() + nearest, sorted.end());
-    const float limit = std::max(kSimilar / 2, kNear * sorted[static_cast<size_t>(nearest)]);
-    for (int t = 0; t < count; ++t)
+    float limit = std::max(kSimilar / 2, kNear * sorted[static_cast<size_t>(nearest)]);
+    // No frame need show what an earlier window did.
+    if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
+    result.limit[cell] = limit;
+    for (int t = 0; t < looks; ++t)
       if (distance[static_cast<size_t>(t) * cells + cell] <= limit)
         result.of_cell[cell].push_back(t);
   }
