@@ -23,7 +23,7 @@ struct Case {
   Reference reference;
   std::vector<uint8_t> frame[3];
 
-  Case(int width, int height, std::mt19937& rng, float gain = 1, bool reach = false) {
+  Case(int width, int height, std::mt19937& rng, float gain = 1) {
     reference.width = width;
     reference.height = height;
     const size_t pixels = reference.pixels();
@@ -44,9 +44,6 @@ struct Case {
     reference.threshold.resize(pixels);
     for (auto& t : reference.threshold) t = static_cast<uint8_t>(6 + rng() % 60);
     if (rng() % 8 == 0) reference.threshold[rng() % pixels] = 255;
-    if (!reach) return;
-    reference.reach.resize(pixels);
-    for (auto& r : reference.reach) r = static_cast<uint8_t>(rng() % 30);
   }
   // The three planes for a call.
   std::array<const uint8_t*, 3> x() const {
@@ -54,14 +51,14 @@ struct Case {
   }
 };
 
-// fill_rows() of a whole frame by its definition. margin: how far a pixel's mean residual is from
-// its threshold.
-struct Filled {
-  std::vector<uint8_t> plane[3];
+// foreground_mask() by its definition. margin: how far a pixel's mean residual is from its
+// threshold.
+struct Mask {
+  std::vector<uint8_t> bits;
   std::vector<double> margin;
 };
 
-Filled naive_fill(const Case& c, const Gain& gain) {
+Mask naive_mask(const Case& c, const Gain& gain) {
   const Reference& r = c.reference;
   const bool lit = is_lit(gain);
   std::vector<int> residual(r.pixels());
@@ -71,145 +68,242 @@ Filled naive_fill(const Case& c, const Gain& gain) {
       d[k] = c.frame[k][p] - (lit ? scaled(r.level[k][p], gain[k]) : r.level[k][p]);
     residual[p] = byte_of(norm(d));
   }
-  Filled out;
+  const auto around = [&](int x, int y, int reach, auto value) {
+    int sum = 0;
+    for (int dy = -reach; dy <= reach; ++dy)
+      for (int dx = -reach; dx <= reach; ++dx)
+        sum += value(static_cast<size_t>(std::clamp(y + dy, 0, r.height - 1) * r.width +
+                                         std::clamp(x + dx, 0, r.width - 1)));
+    return sum;
+  };
+  Mask out;
   out.margin.resize(r.pixels());
-  for (auto& plane : out.plane) plane.resize(r.pixels());
+  out.bits.assign(mask_bytes(r.pixels()), 0);
+  std::vector<uint8_t> exceeds(r.pixels());
   for (int y = 0; y < r.height; ++y)
     for (int x = 0; x < r.width; ++x) {
-      int sum = 0;
-      for (int dy = -2; dy <= 2; ++dy)
-        for (int dx = -2; dx <= 2; ++dx)
-          sum += residual[static_cast<size_t>(std::clamp(y + dy, 0, r.height - 1) * r.width +
-                                              std::clamp(x + dx, 0, r.width - 1))];
       const auto p = static_cast<size_t>(y * r.width + x);
+      const int sum = around(x, y, 2, [&](size_t q) { return residual[q]; });
       out.margin[p] = std::abs(sum / 25.0 - r.threshold[p]);
-      for (size_t k = 0; k < 3; ++k) {
-        const int level = r.level[k][p];
-        int sample = lit ? scaled(c.frame[k][p], 1 / gain[k]) : c.frame[k][p];
-        if (sum > 25 * r.threshold[p]) sample = level;
-        if (!r.reach.empty()) {
-          const int reach = r.reach[p];
-          // std::round() rounds halves away from zero.
-          const double drawn = std::round(1.5 * std::clamp(sample - level, -reach, reach));
-          sample = std::clamp(level + static_cast<int>(drawn), 0, 255);
-        }
-        out.plane[k][p] = static_cast<uint8_t>(sample);
-      }
+      exceeds[p] = sum > 25 * r.threshold[p];
     }
+  for (int y = 0; y < r.height; ++y)
+    for (int x = 0; x < r.width; ++x)
+      if (around(x, y, 3, [&](size_t q) { return exceeds[q]; }) > 24) {
+        const auto p = static_cast<size_t>(y * r.width + x);
+        out.bits[p / 8] = static_cast<uint8_t>(out.bits[p / 8] | 1 << p % 8);
+      }
   return out;
 }
 
-// By fill_rows() in strips of `rows`.
-Filled fill(const Case& c, const Gain& gain, int rows) {
-  const auto width = static_cast<size_t>(c.reference.width);
+std::vector<uint8_t> mask_of(const Case& c, const Gain& gain) {
+  // Memory of its own, so that a byte too many is seen.
+  BeforeTheEdge<uint8_t> bits(mask_bytes(c.reference.pixels()));
   std::vector<uint8_t> scratch;
-  Filled out;
-  for (auto& plane : out.plane) plane.assign(c.reference.pixels(), kUntouched);
-  for (int first = 0; first < c.reference.height; first += rows) {
-    const int count = std::min(rows, c.reference.height - first);
-    // Memory of its own, so that a sample too many is seen.
-    std::unique_ptr<BeforeTheEdge<uint8_t>> strips[3];
-    for (auto& strip : strips)
-      strip = std::make_unique<BeforeTheEdge<uint8_t>>(width * static_cast<size_t>(count));
-    uint8_t* const to[3] = {strips[0]->data(), strips[1]->data(), strips[2]->data()};
-    fill_rows(c.reference, c.x().data(), gain, first, count, to, &scratch);
-    for (size_t k = 0; k < 3; ++k)
-      std::copy(strips[k]->begin(), strips[k]->end(),
-                out.plane[k].begin() + static_cast<ptrdiff_t>(static_cast<size_t>(first) * width));
-  }
-  return out;
+  foreground_mask(c.reference, c.x().data(), gain, bits.data(), &scratch);
+  return {bits.begin(), bits.end()};
 }
 
-// ---- Filling ----
+// ---- Masks ----
 
-TEST(FillRows, IsTheFiveByFiveDecision) {
+TEST(ForegroundMask, IsTheMajorityOfFiveByFiveDecisions) {
   on_every_target([] {
     std::mt19937 rng(31);
-    for (int width = 1; width <= 70; ++width) {
-      const int height = 1 + static_cast<int>(rng() % 12);
-      for (bool reach : {false, true}) {
-        const Case c(width, height, rng, 1, reach);
-        const Filled expected = naive_fill(c, kSameLight), filled = fill(c, kSameLight, height);
-        for (size_t k = 0; k < 3; ++k)
-          ASSERT_EQ(filled.plane[k], expected.plane[k]) << width << " x " << height;
-      }
+    size_t masked = 0, all = 0;
+    for (int width = 1; width <= 140; ++width) {
+      const Case c(width, 1 + static_cast<int>(rng() % 12), rng);
+      const Mask expected = naive_mask(c, kSameLight);
+      ASSERT_EQ(mask_of(c, kSameLight), expected.bits) << width << " x " << c.reference.height;
+      for (size_t p = 0; p < c.reference.pixels(); ++p)
+        masked += is_masked(expected.bits.data(), p);
+      all += c.reference.pixels();
     }
+    // The cases have both.
+    EXPECT_GT(masked, all / 20);
+    EXPECT_LT(masked, all - all / 20);
   });
 }
 
 // Powers of two: scaling rounds the same way with and without fused multiply-adds.
-TEST(FillRows, IsDoneInUnitLight) {
+TEST(ForegroundMask, IsJudgedInTheFramesLight) {
   on_every_target([] {
     std::mt19937 rng(32);
     for (int width : {1, 4, 5, 16, 33, 64, 67})
       for (float g : {0.25f, 0.5f, 2.0f}) {
-        const Case c(width, 9, rng, g, width % 2 == 1);
+        const Case c(width, 9, rng, g);
         const Gain gain = {g, g, 2 * g};
-        const Filled expected = naive_fill(c, gain), filled = fill(c, gain, 9);
-        for (size_t k = 0; k < 3; ++k) ASSERT_EQ(filled.plane[k], expected.plane[k]) << width;
+        ASSERT_EQ(mask_of(c, gain), naive_mask(c, gain).bits) << width;
       }
   });
 }
 
-TEST(FillRows, AnyGainIsWithinItsRounding) {
+TEST(ForegroundMask, AnyGainIsWithinItsRounding) {
   on_every_target([] {
     std::mt19937 rng(33);
     for (float g : {0.37f, 0.9f, 1.3f}) {
-      const Case c(61, 14, rng, g);
+      const Case c(61, 24, rng, g);
       const Gain gain = {g, 1.1f * g, 0.9f};
-      const Filled expected = naive_fill(c, gain), filled = fill(c, gain, 5);
-      for (size_t k = 0; k < 3; ++k)
-        for (size_t p = 0; p < c.reference.pixels(); ++p)
-          if (expected.margin[p] > 1) {
-            ASSERT_NEAR(filled.plane[k][p], expected.plane[k][p], 1);
+      const Mask expected = naive_mask(c, gain);
+      const std::vector<uint8_t> found = mask_of(c, gain);
+      // Where no decision around is near its threshold.
+      for (int y = 3; y < 21; ++y)
+        for (int x = 3; x < 58; ++x) {
+          double margin = 255;
+          for (int q = 0; q < 49; ++q)
+            margin = std::min(
+                margin, expected.margin[static_cast<size_t>((y + q / 7 - 3) * 61 + x + q % 7 - 3)]);
+          const auto p = static_cast<size_t>(y * 61 + x);
+          if (margin > 1) {
+            ASSERT_EQ(is_masked(found.data(), p), is_masked(expected.bits.data(), p));
           }
+        }
     }
   });
 }
 
-TEST(FillRows, AnyStripsGiveTheSameRows) {
-  on_every_target([] {
-    std::mt19937 rng(34);
-    for (float g : {1.0f, 0.7f}) {
-      const Case c(43, 23, rng, g, true);
-      const Gain gain = {g, g, g};
-      const Filled whole = fill(c, gain, 23);
-      for (int rows : {1, 2, 3, 4, 5, 7, 11, 22})
-        for (size_t k = 0; k < 3; ++k)
-          ASSERT_EQ(fill(c, gain, rows).plane[k], whole.plane[k]) << rows;
-    }
-  });
-}
-
-TEST(FillRows, TheSameFrameComesBack) {
+TEST(ForegroundMask, TheSameFrameHasNone) {
   std::mt19937 rng(35);
   Case c(50, 20, rng);
   for (size_t k = 0; k < 3; ++k) c.frame[k] = c.reference.level[k];
-  for (size_t k = 0; k < 3; ++k) EXPECT_EQ(fill(c, kSameLight, 6).plane[k], c.reference.level[k]);
+  for (uint8_t bits : mask_of(c, kSameLight)) EXPECT_EQ(bits, 0);
 }
 
-TEST(FillSamples, IsTheDecisionOfThePixelAlone) {
+// ---- Filling ----
+
+// Snapshots of one scene with noise, masked in places.
+struct MaskedWindow {
+  Window window;
+  WindowMask mask;
+  std::vector<Gain> gains;
+  Reference reference;
+  std::vector<uint8_t> reach;
+
+  // share: of the samples, in per cent, that are masked; the first pixels are masked in all
+  // snapshots, in all but one, in all but two.
+  MaskedWindow(int count, int pixels, int share, const std::vector<float>& lights,
+               std::mt19937& rng)
+      : window(count, static_cast<size_t>(pixels)), mask(count, static_cast<size_t>(pixels)) {
+    reference.width = pixels;
+    reference.height = 1;
+    for (auto& plane : reference.level) plane = random_picture(static_cast<size_t>(pixels), rng);
+    const auto noisy = random_picture(static_cast<size_t>(pixels), rng, 0, 60);
+    for (int t = 0; t < count; ++t) {
+      const int slot = window.append();
+      gains.push_back(kSameLight);
+      for (size_t c = 0; c < 3; ++c) {
+        gains.back()[c] = lights[(static_cast<size_t>(t) + c) % lights.size()];
+        for (int p = 0; p < pixels; ++p) {
+          const int noise = 1 + noisy[static_cast<size_t>(p)];
+          const int level = reference.level[c][static_cast<size_t>(p)] +
+                            static_cast<int>(rng() % static_cast<unsigned>(2 * noise)) - noise;
+          window.plane(slot, static_cast<int>(c))[p] =
+              static_cast<uint8_t>(std::clamp(level, 0, 255));
+        }
+      }
+      for (int p = 0; p < pixels; ++p)
+        if (p < 3 ? t >= p : static_cast<int>(rng() % 100) < share)
+          mask.of(t)[p / 8] = static_cast<uint8_t>(mask.of(t)[p / 8] | 1 << p % 8);
+    }
+    reach.assign(window.plane_size(), 0);
+    for (int p = 0; p < pixels; ++p)
+      reach[static_cast<size_t>(p)] = static_cast<uint8_t>(rng() % 256);
+  }
+
+  uint8_t unit(int t, size_t c, size_t p) const {
+    const float gain = gains[static_cast<size_t>(t)][c];
+    const uint8_t sample = window.plane(t, static_cast<int>(c))[p];
+    return gain == 1 ? sample : scaled(sample, 1 / gain);
+  }
+  int level(size_t c, size_t p) const {
+    std::vector<int> samples;
+    for (int t = 0; t < window.size(); ++t)
+      if (!is_masked(mask.of(t), p)) samples.push_back(unit(t, c, p));
+    if (samples.empty()) return reference.level[c][p];
+    std::sort(samples.begin(), samples.end());
+    return (samples[(samples.size() - 1) / 2] + samples[samples.size() / 2]) / 2;
+  }
+  int filled(int t, size_t c, size_t p, bool draw) const {
+    const int median = level(c, p);
+    if (is_masked(mask.of(t), p)) return median;
+    if (!draw) return unit(t, c, p);
+    return median + std::clamp<int>(unit(t, c, p) - median, -reach[p], reach[p]);
+  }
+};
+
+void expect_filled(const MaskedWindow& w, bool draw, int tolerance = 0) {
+  Filler filler(w.window.size());
+  const size_t pixels = w.window.pixels();
+  for (size_t first = 0; first < pixels; first += filler.run()) {
+    const size_t count = std::min(filler.run(), pixels - first);
+    const uint8_t* const* planes = filler.fill(w.window, w.gains, w.mask, w.reference,
+                                               draw ? w.reach.data() : nullptr, first, count);
+    for (int t = 0; t < w.window.size(); ++t)
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t p = first; p < first + count; ++p)
+          ASSERT_NEAR(planes[3 * static_cast<size_t>(t) + c][p - first], w.filled(t, c, p, draw),
+                      tolerance)
+              << "frame " << t << " pixel " << p << " of " << pixels;
+  }
+}
+
+TEST(Filler, MaskedSamplesBecomeTheMedianOfTheOthers) {
+  on_every_target([] {
+    std::mt19937 rng(51);
+    for (int share : {0, 20, 60, 97, 100})
+      for (const auto& [count, pixels] :
+           {std::pair{1, 5}, {2, 64}, {3, 65}, {7, 130}, {16, 300}, {60, 200}}) {
+        SCOPED_TRACE(testing::Message() << count << " frames, " << share << " % masked");
+        const MaskedWindow w(count, pixels, share, {1}, rng);
+        expect_filled(w, false);
+        expect_filled(w, true);
+      }
+  });
+}
+
+// Samples are counted in bytes: more frames than those can count.
+TEST(Filler, WindowsMayBeLong) {
+  on_every_target([] {
+    std::mt19937 rng(52);
+    for (int count : {254, 255, 256, 257, 700}) expect_filled({count, 70, 30, {1}, rng}, true);
+  });
+}
+
+TEST(Filler, RunsCoverLargePictures) {
+  std::mt19937 rng(53);
+  const MaskedWindow w(9, 20001, 30, {1}, rng);
+  ASSERT_LT(Filler(9).run(), w.window.pixels());
+  expect_filled(w, true);
+}
+
+TEST(Filler, FillsInUnitLight) {
+  on_every_target([] {
+    std::mt19937 rng(54);
+    expect_filled({20, 150, 30, {1, 0.5f, 2, 0.25f}, rng}, false);
+    // Scaling may round a tie by one, in the median, too.
+    expect_filled({20, 150, 30, {1, 0.83f, 1.17f}, rng}, false, 1);
+    expect_filled({20, 150, 30, {1, 0.83f, 1.17f}, rng}, true, 2);
+  });
+}
+
+TEST(FillSamples, TakesEveryStepthPixel) {
   std::mt19937 rng(36);
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {40, 31}})
     for (int step : {1, 2, 3, 8})
       for (float g : {1.0f, 0.5f, 2.0f}) {
         const Case c(width, height, rng, g);
         const Gain gain = {g, g, g};
+        const auto bits = random_picture(mask_bytes(c.reference.pixels()), rng);
         const auto cols = static_cast<size_t>((width + step - 1) / step);
         const size_t count = cols * static_cast<size_t>((height + step - 1) / step);
         BeforeTheEdge<uint8_t> r(count), gr(count), b(count);
         uint8_t* const out[3] = {r.data(), gr.data(), b.data()};
-        fill_samples(c.reference, c.x().data(), gain, step, out);
+        fill_samples(c.reference, bits.data(), c.x().data(), gain, step, out);
         for (size_t i = 0; i < count; ++i) {
           const size_t p = i / cols * static_cast<size_t>(step) * static_cast<size_t>(width) +
                            i % cols * static_cast<size_t>(step);
-          double squared = 0;
           for (size_t k = 0; k < 3; ++k)
-            squared += std::pow(c.frame[k][p] - c.reference.level[k][p] * double{g}, 2);
-          const bool foreground = std::sqrt(squared) > c.reference.threshold[p];
-          for (size_t k = 0; k < 3; ++k)
-            ASSERT_EQ(out[k][i],
-                      foreground ? c.reference.level[k][p] : scaled(c.frame[k][p], 1 / g));
+            ASSERT_EQ(out[k][i], is_masked(bits.data(), p) ? c.reference.level[k][p]
+                                                           : scaled(c.frame[k][p], 1 / g));
         }
       }
 }
@@ -367,8 +461,12 @@ Median median_of(const Stack& stack, int threads) {
   out.spread.assign(stack.window.pixels(), kUntouched);
   uint8_t* const planes[3] = {out.plane[0].data(), out.plane[1].data(), out.plane[2].data()};
   Pool pool(threads);
-  median_picture(stack.window, stack.grid, stack.stable, stack.frame_of, stack.gains, &pool, planes,
-                 out.spread.data());
+  std::vector<LitPicture> frames;
+  for (int t : stack.frame_of)
+    frames.push_back(
+        {{stack.window.plane(t, 0), stack.window.plane(t, 1), stack.window.plane(t, 2)},
+         stack.gains[static_cast<size_t>(t)]});
+  median_picture(stack.grid, stack.stable, frames, &pool, planes, out.spread.data());
   return out;
 }
 

@@ -352,7 +352,7 @@ struct CellScene {
   }
   StableFrames stable() const {
     Pool pool(2);
-    return find_stable_frames(grid, frames, count, &pool);
+    return find_stable_frames(grid, frames, count, nullptr, &pool);
   }
   // Every frame chosen for a cell shows its background there, and some frame is chosen.
   void expect_background(const StableFrames& stable, int margin = 0) const {
@@ -434,7 +434,7 @@ TEST(StableFramesOf, AnyWindowAndGridHasSome) {
       for (bool same : {false, true}) {
         const GridFrames frames =
             same ? GridFrames(grid, count) : random_frames(grid, count, 0, 255, rng);
-        const StableFrames stable = find_stable_frames(grid, frames, count, &pool);
+        const StableFrames stable = find_stable_frames(grid, frames, count, nullptr, &pool);
         ASSERT_EQ(stable.of_cell.size(), grid.cells());
         for (const auto& chosen : stable.of_cell) {
           ASSERT_FALSE(chosen.empty());
@@ -447,6 +447,83 @@ TEST(StableFramesOf, AnyWindowAndGridHasSome) {
         }
       }
     }
+}
+
+// ---- What earlier windows showed ----
+
+// The last picture of `scene` is what an earlier window left, seen in `weight` frames.
+StableFrames with_recollection(const CellScene& scene, float weight) {
+  Pool pool(2);
+  const Recollection earlier = {std::vector<float>(scene.grid.cells(), weight),
+                                std::vector<float>(scene.grid.cells(), kSimilar / 2)};
+  return find_stable_frames(scene.grid, scene.frames, scene.count - 1, &earlier, &pool);
+}
+
+// It stands still in all frames of the window.
+TEST(Recollections, ShowWhatIsBehindWhoeverStandsStill) {
+  CellScene scene(41);
+  for (int t = 0; t < 40; ++t) scene.box(t, 8, 12, 8, 190);
+  scene.expect_background(with_recollection(scene, 20));
+  // Without one nobody knows.
+  const StableFrames alone =
+      find_stable_frames(scene.grid, scene.frames, 40, nullptr, std::make_unique<Pool>(1).get());
+  const auto inside = static_cast<size_t>(12 * scene.grid.cols + 16);
+  EXPECT_NEAR(scene.frames.plane(alone.of_cell[inside][0], 0)[inside], 190, 1);
+}
+
+// Something that an earlier window had for background goes: what is behind has no contour.
+TEST(Recollections, GiveWayToWhatWasBehind) {
+  CellScene scene(41);
+  scene.box(40, 8, 12, 8, 190);
+  for (int t = 0; t < 4; ++t) scene.box(t, 8, 12, 8, 190);
+  scene.expect_background(with_recollection(scene, 20));
+}
+
+TEST(Recollections, ChangeNothingWhereNothingMoved) {
+  CellScene scene(41);
+  for (const auto& chosen : with_recollection(scene, 20).of_cell) EXPECT_EQ(chosen.size(), 41u);
+}
+
+// Another scene: not a cell of what an earlier window left is seen, in none it has a say.
+TEST(Recollections, OfAnotherSceneAreLeftOut) {
+  CellScene scene(41);
+  std::mt19937 rng(27);
+  const GridFrames other = random_frames(scene.grid, 1, 0, 255, rng);
+  for (int c = 0; c < kChannels; ++c)
+    std::copy_n(other.plane(0, c), scene.grid.cells(), scene.frames.plane(40, c));
+  for (float weight : {1.0f, 40.0f, 1000.0f}) {
+    const StableFrames stable = with_recollection(scene, weight);
+    scene.expect_background(stable);
+    for (const auto& chosen : stable.of_cell) ASSERT_LT(chosen.back(), 40);
+  }
+}
+
+// A weight is that of so many frames with this look.
+TEST(Recollections, WeighLikeFrames) {
+  std::mt19937 rng(28);
+  for (const auto& [rows, cols] : kGrids) {
+    const Grid grid = grid_of(rows, cols);
+    // Ten frames of one look, then the recollection's look in some of them.
+    for (int seen : {0, 3}) {
+      GridFrames frames(grid, 11);
+      for (int t = 0; t < 11; ++t)
+        for (int c = 0; c < kChannels; ++c)
+          std::fill_n(frames.plane(t, c), grid.cells(), t >= 10 - seen ? 90.0f : 150.0f);
+      Pool pool(1);
+      for (float weight : {1.0f, 6.0f, 20.0f}) {
+        const Recollection earlier = {std::vector<float>(grid.cells(), weight),
+                                      std::vector<float>(grid.cells(), 2.0f)};
+        const StableFrames stable = find_stable_frames(grid, frames, 10, &earlier, &pool);
+        // Not seen at all, it is another scene.
+        const bool wins =
+            seen > 0 && weight + static_cast<float>(seen) > 10.0f - static_cast<float>(seen);
+        for (const auto& chosen : stable.of_cell) {
+          ASSERT_EQ(chosen.back() == 10, wins) << seen << " seen, weight " << weight;
+          ASSERT_EQ(chosen.front(), wins ? 10 - seen : 0);
+        }
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -104,22 +104,21 @@ TEST(RobustEngine, BlackWhiteAndSinglePixels) {
     }
 }
 
-// Of few frames each may be its own background.
-TEST(RobustEngine, FewFramesComeBackWithinTheirNoise) {
-  for (double sigma : {1.0, 3.0, 8.0, 20.0})
-    for (size_t count : {2, 3, 5, 9}) {
-      Clip clip = static_clip(background(), count);
-      add_noise(clip, sigma, 52);
-      EXPECT_LT(worst_error(backgrounds_of(clip), background()),
-                1.05 * sigma * std::sqrt(2 / M_PI) + 0.3)
-          << "sigma " << sigma << ", frames " << count;
-    }
+// Two frames do not say which of them shows the background.
+TEST(RobustEngine, TwoFramesComeBackWithinTheirNoise) {
+  for (double sigma : {1.0, 3.0, 8.0, 20.0}) {
+    Clip clip = static_clip(background(), 2);
+    add_noise(clip, sigma, 52);
+    EXPECT_LT(worst_error(backgrounds_of(clip), background()),
+              1.05 * sigma * std::sqrt(2 / M_PI) + 0.3)
+        << "sigma " << sigma;
+  }
 }
 
 // The mean of m frames has noise sigma / sqrt(m) and is rounded; the median's is a quarter larger.
 TEST(RobustEngine, NoiseIsAveragedOut) {
   for (double sigma : {1.0, 3.0, 8.0, 20.0})
-    for (size_t count : {12, 20, 60}) {
+    for (size_t count : {3, 4, 5, 9, 12, 20, 60}) {
       SCOPED_TRACE(testing::Message() << "sigma " << sigma << ", frames " << count);
       Clip clip = static_clip(background(), count);
       add_noise(clip, sigma, 52);
@@ -241,6 +240,96 @@ TEST(RobustEngine, OrderAndRateMatterLittle) {
   EXPECT_LT(worst_error(backgrounds_of(half), background()), 1.15 * error + 0.15);
 }
 
+// ---- From window to window ----
+
+// In the second window of 40 somebody stands still all the time.
+Clip standing_clip() {
+  Clip clip(kPixels, 80);
+  for (size_t t = 0; t < 80; ++t) {
+    clip.frames[t] = background();
+    walkers(clip.frames[t], static_cast<int>(t));
+    if (t >= 40) box(clip.frames[t], 36, 20, 20, 40, 88);
+  }
+  add_noise(clip, 2, 52);
+  return clip;
+}
+
+TEST(RobustWindows, WhoStandsThroughOneIsKnownFromTheOneBefore) {
+  const auto pictures = run_engine(standing_clip(), kWidth, kHeight, robust_of(40, 1));
+  ASSERT_EQ(pictures.size(), 80u);
+  for (const auto& picture : pictures) EXPECT_LT(mean_error(picture, background()), 1.0);
+  // The window alone takes the person for background.
+  Clip second = standing_clip();
+  second.frames.erase(second.frames.begin(), second.frames.begin() + 40);
+  const auto alone = run_engine(second, kWidth, kHeight, robust_of(40, 1));
+  EXPECT_GT(mean_error(alone[20], background()), 4);
+}
+
+// Light that changed between the windows changes nothing in that.
+TEST(RobustWindows, KnowEachOtherInAnyLight) {
+  Clip clip = standing_clip();
+  for (size_t t = 40; t < 80; ++t)
+    for (auto& sample : clip.frames[t]) sample = static_cast<uint8_t>(0.7 * sample + 0.5);
+  const auto pictures = run_engine(clip, kWidth, kHeight, robust_of(40, 1));
+  for (size_t t = 40; t < 80; ++t) EXPECT_LT(mean_error(pictures[t], background(0.7)), 1.2) << t;
+}
+
+// After a cut to another scene the first window is as good as without the one before.
+TEST(RobustWindows, ACutIsNoGhost) {
+  Clip clip = walking_clip(80);
+  Clip other(kPixels, 40);
+  for (size_t t = 0; t < 40; ++t) {
+    other.frames[t] = background(1, 400, 300);
+    walkers(other.frames[t], static_cast<int>(t));
+  }
+  add_noise(other, 2, 53);
+  std::copy(other.frames.begin(), other.frames.end(), clip.frames.begin() + 40);
+  const auto pictures = run_engine(clip, kWidth, kHeight, robust_of(40, 1));
+  const auto alone = run_engine(other, kWidth, kHeight, robust_of(40, 1));
+  for (size_t t = 0; t < 40; ++t) EXPECT_EQ(pictures[40 + t], alone[t]) << t;
+}
+
+// A flush forgets; a drain does not.
+TEST(RobustWindows, AFlushForgets) {
+  const Clip clip = standing_clip();
+  for (bool flush : {false, true}) {
+    Engine engine;
+    ASSERT_TRUE(engine.configure(robust_of(40, 1), kWidth, kHeight).ok());
+    std::vector<uint8_t> last;
+    const auto take = [&] {
+      while (engine.ready()) {
+        Picture picture(kWidth, kHeight);
+        engine.pop(Output::background, picture.out());
+        last = picture.planes();
+      }
+    };
+    for (size_t t = 0; t < 80; ++t) {
+      if (t == 40 && flush) engine.flush();
+      if (t == 40 && !flush) {
+        ASSERT_TRUE(engine.drain().ok());
+        take();
+      }
+      Picture picture(kWidth, kHeight);
+      picture.fill(clip.frames[t]);
+      ASSERT_TRUE(engine.push(picture.in()).ok());
+      take();
+    }
+    if (flush)
+      EXPECT_GT(mean_error(last, background()), 4);
+    else
+      EXPECT_LT(mean_error(last, background()), 1);
+  }
+}
+
+TEST(RobustWindows, LiveKnowsThemToo) {
+  EngineOptions options = robust_of(40, 1);
+  options.mode = Mode::live;
+  options.hop_size = 10;
+  const auto pictures = run_engine(standing_clip(), kWidth, kHeight, options);
+  ASSERT_EQ(pictures.size(), 80u);
+  EXPECT_LT(mean_error(pictures[79], background()), 1.0);
+}
+
 TEST(RobustEngine, ThreadsChangeNothing) {
   std::vector<double> gains;
   for (int t = 0; t < 70; ++t) gains.push_back(t < 30 ? 1 : 0.7);
@@ -282,6 +371,22 @@ TEST(RobustEngine, LiveEveryFrameComesOut) {
 
 // ---- Hard cases ----
 
+// How far pictures of L(t) leave the range of their clip's frames, in levels.
+int excursion(const std::vector<std::vector<uint8_t>>& pictures, const Clip& clip) {
+  int low[3] = {255, 255, 255}, high[3] = {0, 0, 0}, worst = 0;
+  for (const auto& frame : clip.frames)
+    for (size_t i = 0; i < frame.size(); ++i) {
+      const size_t c = i / clip.pixels;
+      low[c] = std::min<int>(low[c], frame[i]), high[c] = std::max<int>(high[c], frame[i]);
+    }
+  for (const auto& picture : pictures)
+    for (size_t i = 0; i < picture.size(); ++i) {
+      const size_t c = i / clip.pixels;
+      worst = std::max({worst, low[c] - picture[i], picture[i] - high[c]});
+    }
+  return worst;
+}
+
 TEST(RobustEngine, HardCasesPass) {
   for (const auto& hard : stability::hard_cases()) {
     SCOPED_TRACE(hard.name);
@@ -314,27 +419,26 @@ TEST(RobustEngine, HardCasesPass) {
         EXPECT_TRUE(std::isfinite(report.foreground.noise));
         EXPECT_TRUE(std::isfinite(report.foreground.threshold));
         EXPECT_TRUE(report.dmd.converged);
-        // A background is nowhere outside of what its frames were in, but for a change of light.
-        // Not so of a few pixels, where noise alone makes the mode decay (plain Q-DMD's does, too).
-        const bool few = pixels < 16;
-        uint8_t low[3] = {255, 255, 255}, high[3] = {0, 0, 0};
-        for (const auto& frame : clip.frames)
-          for (size_t i = 0; i < frame.size(); ++i) {
-            const size_t c = i / clip.pixels;
-            low[c] = std::min(low[c], frame[i]), high[c] = std::max(high[c], frame[i]);
-          }
-        size_t count = 0;
-        for (; engine.ready(); ++count) {
+        std::vector<std::vector<uint8_t>> pictures;
+        while (engine.ready()) {
           Picture picture(pixels / height, height);
           engine.pop(Output::background, picture.out());
-          const auto planes = picture.planes();
-          for (size_t i = 0; i < planes.size() && !few; ++i) {
-            const size_t c = i / clip.pixels;
-            ASSERT_GE(planes[i] + 3, low[c]) << "frame " << count;
-            ASSERT_LE(planes[i], high[c] + 3) << "frame " << count;
-          }
+          pictures.push_back(picture.planes());
         }
-        EXPECT_EQ(count, clip.size());
+        EXPECT_EQ(pictures.size(), clip.size());
+        // Of a few pixels noise alone makes the mode decay (plain Q-DMD's does, too).
+        if (pixels < 16) continue;
+        // One mode is nowhere outside of what its frames were in, but for a change of light.
+        // Several follow a pixel's own course like plain Q-DMD's do: an exponential through a ramp
+        // leaves it at the ends.
+        int allowed = 3;
+        if (rank > 1) {
+          EngineOptions plain = options;
+          plain.dmd.method = Method::qdmd;
+          allowed =
+              std::max(allowed, excursion(run_engine(clip, pixels / height, height, plain), clip));
+        }
+        EXPECT_LE(excursion(pictures, clip), allowed) << "height " << height << ", rank " << rank;
       }
     }
   }

@@ -25,8 +25,12 @@ void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
                  uint16_t* HWY_RESTRICT masked) {
   const Bytes d;
   const auto ones = hn::Set(d, 255);
-  for (size_t i = 0; i < count; i += hn::Lanes(d))
-    hn::StoreU(hn::IfThenZeroElse(hn::LoadMaskBits(d, bits + i / 8), ones), d, keep + i);
+  if (hn::Lanes(d) < 8) {
+    for (size_t i = 0; i < count; ++i) keep[i] = (bits[i / 8] >> i % 8 & 1) != 0 ? 0 : 255;
+  } else {
+    for (size_t i = 0; i < count; i += hn::Lanes(d))
+      hn::StoreU(hn::IfThenZeroElse(hn::LoadMaskBits(d, bits + i / 8), ones), d, keep + i);
+  }
   for (size_t i = 0; i < count; ++i) masked[i] = static_cast<uint16_t>(masked[i] + (keep[i] == 0));
 }
 
@@ -105,21 +109,18 @@ void median_row(const uint8_t* samples, size_t stride, size_t planes,
   }
 }
 
-// Samples that are not kept become the level; others are drawn to it by one step of Huber's
-// estimate. count: a multiple of 64.
+// Samples that are not kept become the level; others come as near to it as reach. count: a multiple
+// of 64.
 void draw_row(const uint8_t* HWY_RESTRICT level, const uint8_t* HWY_RESTRICT reach,
               const uint8_t* HWY_RESTRICT keep, size_t count, uint8_t* HWY_RESTRICT samples) {
   const Bytes d;
-  const auto zero = hn::Zero(d);
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto x = hn::LoadU(d, samples + i), l = hn::LoadU(d, level + i);
     const auto above = hn::SaturatedSub(x, l), below = hn::SaturatedSub(l, x);
     const auto limit = hn::And(hn::LoadU(d, reach + i), hn::LoadU(d, keep + i));
     const auto up = hn::Min(above, limit), down = hn::Min(below, limit);
-    // Halves are rounded away from the level: upwards, they would brighten it.
-    const auto more = hn::Add(up, hn::AverageRound(up, zero));
-    const auto less = hn::Add(down, hn::AverageRound(down, zero));
-    hn::StoreU(hn::SaturatedSub(hn::SaturatedAdd(l, more), less), d, samples + i);
+    // One of them is 0.
+    hn::StoreU(hn::Sub(hn::Add(l, up), down), d, samples + i);
   }
 }
 

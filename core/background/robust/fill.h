@@ -34,15 +34,15 @@ class Filler {
 
   // Pixels first .. first + count - 1 in unit light; `first` is a multiple of 64. Where a snapshot
   // is masked, it becomes the median of the pixel's other snapshots, or the reference's level where
-  // there are none. Others are drawn to that median where they lie farther from it than `reach`,
-  // and all are weighted a half more: one step of Huber's estimate of the mean (Robust Statistics,
-  // 1981). reach: width * height samples, at most kMostReach, or null: any distance, no weight.
+  // there are none. Others are
+  // drawn to that median until they are no farther from it than `reach`: one step of Huber's
+  // estimate of the mean (Robust Statistics, 1981). reach: width * height samples, or null: any
+  // distance.
   // Returns a plane of samples for each channel of each snapshot, readable up to the next multiple
   // of 64; they are good until the next call.
   const uint8_t* const* fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
                              const WindowMask& mask, const Reference& reference,
                              const uint8_t* reach, size_t first, size_t count);
-  static constexpr int kMostReach = 100;
 
  private:
   size_t run_;

@@ -79,12 +79,18 @@ void most_row(const uint8_t* const* rows, size_t count, uint8_t* HWY_RESTRICT ou
     out[i] = static_cast<uint8_t>(a[i] + b[i] + c[i] + d[i] + e[i] + f[i] + g[i]) > 24;
 }
 
-// One bit for each of `count` samples, set where they are not 0. Samples are readable up to the
-// next multiple of 64.
+// One bit for each of `count` samples, set where they are not 0. Samples are readable, and bits
+// are written, up to the next multiple of 64.
 void pack_bits(const uint8_t* samples, size_t count, uint8_t* bits) {
   const hn::CappedTag<uint8_t, 64> d;
   const size_t lanes = hn::Lanes(d);
   const auto zero = hn::Zero(d);
+  if (lanes < 8) {
+    std::memset(bits, 0, mask_bytes(count));
+    for (size_t i = 0; i < count; ++i)
+      bits[i / 8] = static_cast<uint8_t>(bits[i / 8] | (samples[i] != 0) << i % 8);
+    return;
+  }
   for (size_t i = 0; i < count; i += lanes)
     hn::StoreMaskBits(d, hn::Gt(hn::LoadU(d, samples + i), zero), bits + i / 8);
 }

@@ -8,7 +8,7 @@ namespace qdmd {
 
 constexpr int kPatchRadius = 2;  // cells: patches of 5 x 5
 constexpr float kSimilar =
-    4;  // levels a channel: the distance at which patches are no longer alike
+    5;  // levels a channel: the distance at which patches are no longer alike
 constexpr float kMostDistance = 40;  // levels a channel: a cell counts at most this
 
 // density[t * cells + cell] = sum over frames s of max(0, 1 - d(s, t) / kSimilar), where d is the

@@ -100,8 +100,7 @@ void RobustSolver::start(const SnapshotRange& snapshots) {
     const int wide = reach_[p];
     reference_.threshold[p] = static_cast<uint8_t>(
         std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
-    reach_[p] = static_cast<uint8_t>(
-        std::clamp((wide + 4) / 8, parameters_.least_reach, Filler::kMostReach));
+    reach_[p] = static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
   }
 }
 

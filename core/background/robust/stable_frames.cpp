@@ -12,10 +12,10 @@ namespace {
 // may be what the background looks like without an object. Smaller regions than kLeastCells, looks
 // that fewer than kLeastSupport of the frames share (in units of alike frames, at least two) and
 // contours that are not weaker by kMargin do not count.
-constexpr float kChange = 8;
+constexpr float kChange = 10;
 constexpr int kLeastCells = 6;
 constexpr float kLeastSupport = 0.04f;
-constexpr float kMargin = 1.25f;
+constexpr float kMargin = 1.2f;
 constexpr size_t kLeastContour = 8;
 // The share of cells that must show what an earlier window did: people seldom hide more.
 constexpr float kLeastSeen = 0.15f;
@@ -25,7 +25,7 @@ constexpr int kProposals = 64;
 // A frame shows the background where its patch is as near to the background's as kNear times the
 // nearest tenth, or as half the distance at which patches are alike.
 constexpr float kNear = 3;
-constexpr double kNearest = 0.1;
+constexpr double kNearest = 0.08;
 
 // The picture that takes each cell from the frame `from`.
 class GridPicture {
@@ -217,12 +217,16 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   result.of_cell.resize(cells);
   result.limit.resize(cells);
   std::vector<float> sorted(static_cast<size_t>(count));
-  const auto nearest = static_cast<ptrdiff_t>(kNearest * (count - 1));
   for (size_t cell = 0; cell < cells; ++cell) {
+    // A frame is not its own neighbour, but of two it would be wrong to trust the other.
+    size_t others = 0;
     for (int t = 0; t < count; ++t)
-      sorted[static_cast<size_t>(t)] = distance[static_cast<size_t>(t) * cells + cell];
-    std::nth_element(sorted.begin(), sorted.begin() + nearest, sorted.end());
-    float limit = std::max(kSimilar / 2, kNear * sorted[static_cast<size_t>(nearest)]);
+      if (t != from[cell] || count <= 2)
+        sorted[others++] = distance[static_cast<size_t>(t) * cells + cell];
+    const auto nearest =
+        sorted.begin() + static_cast<ptrdiff_t>(kNearest * static_cast<double>(others - 1));
+    std::nth_element(sorted.begin(), nearest, sorted.begin() + static_cast<ptrdiff_t>(others));
+    float limit = std::max(kSimilar / 2, kNear * *nearest);
     // No frame need show what an earlier window did.
     if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
     result.limit[cell] = limit;
