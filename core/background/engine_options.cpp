@@ -1,5 +1,7 @@
 #include "core/background/engine_options.h"
 
+#include <cmath>
+
 #include "core/background/live_schedule.h"
 #include "core/background/window_solver.h"
 #include "core/dmd/qdmd.h"
@@ -28,10 +30,12 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   layout.capacity = options.window_size;
   if (options.mode == Mode::live)
     layout.capacity += schedule_of(options, pixels).most_late_frames();
-  const uint64_t samples =
-      WindowSolver::sample_bytes(layout.capacity, width, height, layout.sample_step);
-  if (__builtin_add_overflow(Window::bytes(layout.capacity, pixels), samples, &layout.bytes))
-    layout.bytes = UINT64_MAX;
+  layout.frame_bytes = Window::bytes(layout.capacity, pixels);
+  const uint64_t beside =
+      options.dmd.method == Method::robust
+          ? RobustSolver::bytes(layout.capacity, width, height, layout.sample_step)
+          : WindowSolver::sample_bytes(layout.capacity, width, height, layout.sample_step);
+  if (__builtin_add_overflow(layout.frame_bytes, beside, &layout.bytes)) layout.bytes = UINT64_MAX;
   return layout;
 }
 
@@ -58,11 +62,15 @@ Status check_options(const EngineOptions& options, int width, int height) {
   const EngineLayout layout = layout_of(options, width, height);
   if (layout.bytes > options.max_memory)
     return {Code::too_much_memory,
-            "A window-size of " + frames + " needs " + std::to_string(layout.bytes) +
-                " bytes and max-memory allows " + std::to_string(options.max_memory) +
+            "A window-size of " + frames + " needs " + std::to_string(layout.bytes) + " bytes (" +
+                std::to_string(layout.frame_bytes) + " for its frames) and max-memory allows " +
+                std::to_string(options.max_memory) +
                 ": lower window-size, scale the video down, or raise max-memory."};
   if (options.dmd.method != Method::dmd && options.dmd.solver == Solver::adjoint) {
-    const double pixels = static_cast<double>(width) * static_cast<double>(height);
+    // Method::robust decomposes sampled pixels only.
+    const int step = options.dmd.method == Method::robust ? layout.sample_step : 1;
+    const double pixels = std::ceil(static_cast<double>(width) / step) *
+                          std::ceil(static_cast<double>(height) / step);
     const double solver = adjoint_bytes(pixels, options.window_size);
     if (solver > static_cast<double>(options.max_memory))
       return {Code::too_much_memory,

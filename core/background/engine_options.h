@@ -18,7 +18,7 @@ struct EngineOptions {
   Mode mode = Mode::batch;
   int window_size = 100;  // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;       // frames between solves in live mode, up to m; 0: m / 4
-  DmdOptions dmd;
+  DmdOptions dmd = {.method = Method::robust};
   int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
@@ -50,7 +50,8 @@ struct EngineLayout {
   int capacity = 0;  // frames that are kept: the window's, in live mode also those that arrive
                      // while one is solved
   int sample_step = 1;
-  uint64_t bytes = 0;  // of the frames that are kept
+  uint64_t frame_bytes = 0;  // of the frames that are kept
+  uint64_t bytes = 0;        // of these and of what grows with them beside
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
 

@@ -38,6 +38,7 @@ double time_of(const Size& size, int window, Solver solver) {
   };
 
   EngineOptions options;
+  options.dmd.method = Method::qdmd;
   options.window_size = window;
   options.dmd.solver = solver;
   options.dmd.amplitude = solver == Solver::adjoint ? Amplitude::first_frame : Amplitude::window;

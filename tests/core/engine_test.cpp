@@ -159,7 +159,7 @@ TEST(EngineStatus, PushWhileFramesAreWaiting) {
 
 Status::Code configured(const std::function<void(EngineOptions&)>& change, int width = 4,
                         int height = 3) {
-  EngineOptions options;
+  EngineOptions options = window_of(100);
   change(options);
   Engine engine;
   const Status status = engine.configure(options, width, height);

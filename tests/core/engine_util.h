@@ -98,8 +98,10 @@ struct Strip {
   }
 };
 
+// Of plain Q-DMD: what it gives can be said exactly. robust_of() has the default method.
 inline EngineOptions window_of(int size) {
   EngineOptions options;
+  options.dmd.method = Method::qdmd;
   options.window_size = size;
   return options;
 }

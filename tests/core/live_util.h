@@ -12,9 +12,8 @@
 namespace qdmd::test {
 
 inline EngineOptions live_of(int window, int hop = 0) {
-  EngineOptions options;
+  EngineOptions options = window_of(window);
   options.mode = Mode::live;
-  options.window_size = window;
   options.hop_size = hop;
   options.threads = 1;
   return options;

@@ -76,6 +76,14 @@ TEST(Cells, CoverThePictureWithoutOverlap) {
     }
 }
 
+TEST(Cells, AreFewInThinPictures) {
+  for (int length : {100, 1000, 100000, 1 << 30})
+    for (int width : {1, 3, 50}) {
+      EXPECT_LE(Grid(length, width).cols, 2 * kMostCellsAlong);
+      EXPECT_LE(Grid(width, length).rows, 2 * kMostCellsAlong);
+    }
+}
+
 TEST(Cells, MeansAreThoseOfTheirPixels) {
   std::mt19937 rng(5);
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}}) {

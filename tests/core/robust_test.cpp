@@ -369,6 +369,23 @@ TEST(RobustEngine, LiveEveryFrameComesOut) {
   EXPECT_GT(engine.solves(), 5u);
 }
 
+// ---- Memory ----
+
+TEST(RobustEngine, MemoryBesideTheFramesCounts) {
+  EngineOptions options = robust_of(100);
+  const EngineLayout layout = layout_of(options, 1920, 1080);
+  EXPECT_EQ(layout.frame_bytes, uint64_t{100} * 3 * 1920 * 1080);
+  // A mask has a bit a pixel, the pictures are those of some frames.
+  EXPECT_GT(layout.bytes, layout.frame_bytes + uint64_t{100} * 1920 * 1080 / 8);
+  EXPECT_LT(layout.bytes, layout.frame_bytes + layout.frame_bytes / 5);
+  options.max_memory = layout.bytes;
+  EXPECT_TRUE(check_options(options, 1920, 1080).ok());
+  options.max_memory = layout.bytes - 1;
+  const Status status = check_options(options, 1920, 1080);
+  EXPECT_EQ(status.code, Status::Code::too_much_memory);
+  EXPECT_NE(status.message.find(std::to_string(layout.frame_bytes)), std::string::npos);
+}
+
 // ---- Hard cases ----
 
 // How far pictures of L(t) leave the range of their clip's frames, in levels.

@@ -16,6 +16,7 @@ using namespace qdmd::evaluation;
 // L(t) of each frame, the clip being one window.
 std::vector<cv::Mat> backgrounds(const Clip& clip, int rank, int sample_step) {
   EngineOptions options;
+  options.dmd.method = Method::qdmd;
   options.window_size = static_cast<int>(clip.frames.size());
   options.dmd.rank = rank;
   options.sample_step = sample_step;

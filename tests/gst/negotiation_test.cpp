@@ -165,7 +165,7 @@ TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {
   int code = 0;
   const std::string text = first_word(
       "videotestsrc num-buffers=2 ! video/x-raw,format=RGB,width=1920,height=1080 ! "
-      "qdmdbackground window-size=100 solver=adjoint ! fakesink",
+      "qdmdbackground method=qdmd window-size=100 solver=adjoint ! fakesink",
       &domain, &code);
   EXPECT_EQ(GST_RESOURCE_ERROR, domain);
   EXPECT_NE(std::string::npos, text.find("solver=gram")) << text;

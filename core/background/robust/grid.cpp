@@ -7,7 +7,8 @@ namespace qdmd {
 
 Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(height_) {
   const int side = std::max(
-      1, static_cast<int>(std::lround(std::min(width, height) / static_cast<double>(cells_along))));
+      {1, static_cast<int>(std::lround(std::min(width, height) / static_cast<double>(cells_along))),
+       std::max(width, height) / kMostCellsAlong});
   rows = std::max(1, height / side);
   cols = std::max(1, width / side);
 }

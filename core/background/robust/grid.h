@@ -9,8 +9,9 @@
 
 namespace qdmd {
 
-// Cells of about 1/kCellsAlong of the picture's short side; they cover it without overlap.
-constexpr int kCellsAlong = 48;
+// Square cells of about 1/kCellsAlong of the picture's short side, in very thin pictures of
+// 1/kMostCellsAlong of the long one; they cover it without overlap.
+constexpr int kCellsAlong = 48, kMostCellsAlong = 640;
 struct Grid {
   int width = 0, height = 0;  // pixels
   int rows = 0, cols = 0;     // cells

@@ -16,6 +16,23 @@ int RobustSolver::chosen_step(int width, int height) {
   return std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0)));
 }
 
+uint64_t RobustSolver::bytes(int capacity, int width, int height, int sample_step) {
+  const RobustParameters parameters;
+  const uint64_t cells = Grid(width, height, parameters.cells_along).cells();
+  const auto frames = static_cast<uint64_t>(capacity);
+  const uint64_t looks =
+      std::min<uint64_t>(frames, static_cast<uint64_t>(parameters.start_frames)) + 1;
+  const uint64_t pixels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+  // The ring, its copy at a start, the frames compared, their densities twice.
+  const uint64_t of_cells =
+      cells * sizeof(float) * (2 * kChannels * frames + (kChannels + 2) * looks);
+  // The reference and what an earlier window left: levels, spread, threshold, reach.
+  const uint64_t of_pictures = pixels * (2 * kChannels + 4);
+  const auto cols = static_cast<size_t>(sampled(width, sample_step));
+  return of_cells + of_pictures + WindowMask::bytes(capacity, static_cast<size_t>(pixels)) +
+         Window::bytes(capacity, cols * static_cast<size_t>(sampled(height, sample_step)));
+}
+
 RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity,
                            int width, int height, Pool* pool, const RobustParameters& parameters)
     : options_(options),

@@ -42,6 +42,9 @@ class RobustSolver {
   RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity, int width,
                int height, Pool* pool, const RobustParameters& parameters = {});
 
+  // Bytes beside the window: cells, masks, samples, pictures, and what a start compares.
+  static uint64_t bytes(int capacity, int width, int height, int sample_step);
+
   // The step that leaves about 120 samples along the short side.
   static int chosen_step(int width, int height);
 
