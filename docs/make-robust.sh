@@ -36,10 +36,10 @@ echo "== pictures" >&2
 # docs/images/robust-NAME.jpg.
 sheet() {
   # Without truth it ends with 1.
-  "${evaluate[@]}" --dataset "$results/$1" --methods robust,qdmd,median \
+  "${evaluate[@]}" --dataset "$results/$1" --methods robust,qdmd,dmd,median \
     --picture "$2" --output-dir "$results/$1-out" >/dev/null || [ -f "$results/$1-out/$1_sheet.png" ]
   gst-launch-1.0 -q filesrc location="$results/$1-out/$1_sheet.png" ! pngdec ! videoconvert ! \
-    videoscale method=lanczos ! video/x-raw,width=1200,pixel-aspect-ratio=1/1 ! \
+    videoscale method=lanczos ! video/x-raw,width=1400,pixel-aspect-ratio=1/1 ! \
     jpegenc quality=82 ! filesink location="docs/images/robust-$1.jpg"
 }
 # 20 seconds of a scene in which a bag is left, and of one in which the light fades.
