@@ -34,6 +34,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   pixels_ = snapshots.pixels();
   frozen_ = false;
   gains_.clear();
+  limits_.clear();
   planes_.clear();
   for (int t = 0; t < snapshots.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));

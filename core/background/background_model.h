@@ -40,6 +40,11 @@ class BackgroundModel {
   // For set_time() from now on, in place of the snapshots' gains.
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
 
+  // Of each pixel, in levels: what its residual must exceed to be foreground where nobody asks for
+  // a threshold. Kept until begin().
+  void set_limits(std::vector<uint8_t> limits) { limits_ = std::move(limits); }
+  const uint8_t* limits() const { return limits_.empty() ? nullptr : limits_.data(); }
+
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
 
@@ -71,6 +76,7 @@ class BackgroundModel {
   std::vector<float*> pictures_;
   std::vector<float> weights_;  // 3 x K over pictures
   std::vector<Gain> gains_;     // of the snapshots; none: the same light
+  std::vector<uint8_t> limits_;
 };
 
 }  // namespace qdmd

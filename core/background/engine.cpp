@@ -223,6 +223,7 @@ void Engine::pop(Output output, const MutableImageView& out) {
                            &model,
                            output,
                            solver_.report().foreground.threshold,
+                           options_.foreground_threshold > 0 ? nullptr : model.limits(),
                            alpha_.samples(slot),
                            alpha_.constant(slot)};
   if (side_->idle())

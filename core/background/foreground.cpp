@@ -28,7 +28,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
   // The largest quaternion norm of a difference is 255 sqrt(3).
-  std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{};
+  std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{}, beyond_limits{};
+  const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
   uint64_t total = 0;
   BackgroundRun background;
   const int frames = std::min(kFrames, snapshots.size());
@@ -49,7 +50,9 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
           squared += difference * difference;
         }
         const double norm = std::sqrt(squared);
-        ++histogram[static_cast<size_t>(norm * kBinsPerLevel)];
+        const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
+        ++histogram[bin];
+        if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
       }
       total += count;
     }
@@ -65,7 +68,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       fixed_threshold > 0 ? fixed_threshold : automatic_threshold(statistics.noise);
   uint64_t above = 0;
   for (size_t bin = 0; bin < histogram.size(); ++bin)
-    if (static_cast<double>(bin) / kBinsPerLevel > statistics.threshold) above += histogram[bin];
+    if (static_cast<double>(bin) / kBinsPerLevel > statistics.threshold)
+      above += beyond_limits[bin];
   statistics.ratio = total > 0 ? static_cast<double>(above) / static_cast<double>(total) : 0;
   return statistics;
 }
@@ -87,7 +91,9 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
       const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
       task.model->evaluate(first, count, background.rows);
       const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
-      if (masked) foreground_mask(x, background.rows, count, task.threshold, mask);
+      if (masked)
+        foreground_mask(x, background.rows, count, task.threshold,
+                        task.limits ? task.limits + first : nullptr, mask);
       const uint8_t* channels[3];
       for (int c = 0; c < kChannels; ++c) {
         channels[c] = made[c];

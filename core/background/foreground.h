@@ -16,7 +16,7 @@ enum class Output {
 struct ForegroundStatistics {
   double noise = 0;      // standard deviation of one channel, grey levels
   double threshold = 0;  // quaternion norm in grey levels above which a pixel is foreground
-  double ratio = 0;      // share of the sampled pixels above the threshold, 0 .. 1
+  double ratio = 0;      // share of the sampled pixels above it and their own limits, 0 .. 1
 };
 
 // The threshold that suits a noise level: max(4 sqrt(3) sigma, 18) grey levels of quaternion norm.
@@ -25,7 +25,7 @@ double automatic_threshold(double noise);
 // Looks at a sample of the window's residuals |x_t - L(t)| (quaternion norm). The noise comes from
 // their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
-// `fixed_threshold`, or, where that is 0, the automatic one.
+// `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
 // Leaves the model's time at the last sampled snapshot.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold);
@@ -36,6 +36,7 @@ struct OutputTask {
   const BackgroundModel* model;  // at the frame's time
   Output output;
   double threshold;        // quaternion norm, grey levels
+  const uint8_t* limits;   // of each pixel, where that is more; or null
   const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
   uint8_t constant_alpha;  // this
 };

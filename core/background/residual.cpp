@@ -29,9 +29,11 @@ size_t differ(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out) {
   return p;
 }
 
-// White where the squared norm exceeds `limit`; sums saturate, so `limit` is below 65535.
-size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, uint16_t limit,
-              uint8_t* out) {
+// White where the squared norm exceeds `limit` and the square of the pixel's own; sums saturate, so
+// `limit` is below 65535.
+template <bool kOwnLimits>
+HWY_INLINE size_t exceed_limits(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+                                uint16_t limit, const uint8_t* limits, uint8_t* out) {
   const hn::ScalableTag<uint16_t> d16;
   const hn::RebindToSigned<decltype(d16)> d16s;
   const hn::Rebind<uint8_t, decltype(d16)> d8;
@@ -45,11 +47,22 @@ size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, ui
   size_t p = 0;
   for (; p + hn::Lanes(d16) <= count; p += hn::Lanes(d16)) {
     const auto sum = hn::SaturatedAdd(hn::SaturatedAdd(square(0, p), square(1, p)), square(2, p));
+    auto least = largest;
+    if constexpr (kOwnLimits) {
+      const auto own = hn::PromoteTo(d16, hn::LoadU(d8, limits + p));
+      least = hn::Max(least, hn::Mul(own, own));
+    }
     // 0xFFFF to 0x00FF: the samples' 255.
-    const auto white = hn::ShiftRight<8>(hn::VecFromMask(d16, hn::Gt(sum, largest)));
+    const auto white = hn::ShiftRight<8>(hn::VecFromMask(d16, hn::Gt(sum, least)));
     hn::StoreU(hn::DemoteTo(d8, hn::BitCast(d16s, white)), d8, out + p);
   }
   return p;
+}
+
+size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, uint16_t limit,
+              const uint8_t* limits, uint8_t* out) {
+  return limits ? exceed_limits<true>(x, l, count, limit, limits, out)
+                : exceed_limits<false>(x, l, count, limit, nullptr, out);
 }
 
 size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
@@ -80,16 +93,16 @@ void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t
 }
 
 void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
-                     double threshold, uint8_t* out) {
+                     double threshold, const uint8_t* limits, uint8_t* out) {
   // Squared norms are integers.
   const auto limit = static_cast<int>(std::min(std::floor(threshold * threshold), 1e6));
   size_t p = 0;
   if (limit < 65535)
-    p = HWY_DYNAMIC_DISPATCH(exceed)(x, l, count, static_cast<uint16_t>(limit), out);
+    p = HWY_DYNAMIC_DISPATCH(exceed)(x, l, count, static_cast<uint16_t>(limit), limits, out);
   for (; p < count; ++p) {
     int sum = 0;
     for (int c = 0; c < 3; ++c) sum += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
-    out[p] = sum > limit ? 255 : 0;
+    out[p] = sum > limit && (!limits || sum > limits[p] * limits[p]) ? 255 : 0;
   }
 }
 

@@ -10,9 +10,9 @@ namespace qdmd {
 void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out);
 
 // out[p] = 255 where the quaternion norm of x - l exceeds `threshold` (grey levels, >= 0; a norm is
-// at most 255 sqrt(3)), else 0. x, l: R, G, B.
+// at most 255 sqrt(3)) and the pixel's own limit, else 0. x, l: R, G, B. limits: or null, for none.
 void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
-                     double threshold, uint8_t* out);
+                     double threshold, const uint8_t* limits, uint8_t* out);
 
 // out[p] = x[p] where mask[p] is 255, 0 where it is 0.
 void apply_mask(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out);

@@ -199,8 +199,13 @@ void add_output(const char* name, Output output, const Size& size) {
     return all;
   };
   add(name, size, traffic, [output](Scene& scene) {
-    const OutputTask task = {
-        {scene.plane(0), scene.plane(1), scene.plane(2)}, &scene.model, output, 18, nullptr, 255};
+    const OutputTask task = {{scene.plane(0), scene.plane(1), scene.plane(2)},
+                             &scene.model,
+                             output,
+                             18,
+                             nullptr,
+                             nullptr,
+                             255};
     write_output(task, view_of(scene.size, scene.packed_out()), 0, scene.size.height);
   });
 }
@@ -278,7 +283,7 @@ void add_all(const Size& size) {
       [](Scene& scene) {
         const uint8_t* const x[3] = {scene.plane(0), scene.plane(1), scene.plane(2)};
         const uint8_t* const l[3] = {scene.level(0), scene.level(1), scene.level(2)};
-        foreground_mask(x, l, scene.size.pixels(), 18, scene.packed_out());
+        foreground_mask(x, l, scene.size.pixels(), 18, nullptr, scene.packed_out());
       });
   add(
       "apply_mask", size,

@@ -94,6 +94,7 @@ class Batch {
         &solver_.model(),
         Output::mask,
         solver_.report().foreground.threshold,
+        solver_.model().limits(),
         nullptr,
         255};
     const size_t bands = std::max<size_t>(1, window_.pixels() / kPixelsPerBand);

@@ -277,8 +277,11 @@ struct Pixels {
     }
     const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
     const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
-    BeforeTheEdge<uint8_t> mask(count);
-    foreground_mask(x, l, count, threshold, mask.data());
+    BeforeTheEdge<uint8_t> mask(count), limits(count), limited(count);
+    foreground_mask(x, l, count, threshold, nullptr, mask.data());
+    std::mt19937 rng(static_cast<uint32_t>(first + count));
+    for (uint8_t& limit : limits) limit = random_byte(rng);
+    foreground_mask(x, l, count, threshold, limits.data(), limited.data());
     for (size_t p = 0; p < count; ++p) {
       int64_t sum = 0;
       for (size_t c = 0; c < 3; ++c) {
@@ -289,6 +292,8 @@ struct Pixels {
       const bool above =
           std::sqrt(static_cast<long double>(sum)) > static_cast<long double>(threshold);
       ASSERT_EQ(mask[p], above ? 255 : 0) << "squared norm " << sum << ", threshold " << threshold;
+      ASSERT_EQ(limited[p], above && sum > limits[p] * limits[p] ? 255 : 0)
+          << "squared norm " << sum << ", limit " << int{limits[p]};
     }
   }
 };

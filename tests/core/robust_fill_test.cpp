@@ -51,7 +51,7 @@ struct Case {
   }
 };
 
-// foreground_mask() by its definition. margin: how far a pixel's mean residual is from its
+// find_mask() by its definition. margin: how far a pixel's mean residual is from its
 // threshold.
 struct Mask {
   std::vector<uint8_t> bits;
@@ -100,7 +100,7 @@ std::vector<uint8_t> mask_of(const Case& c, const Gain& gain) {
   // Memory of its own, so that a byte too many is seen.
   BeforeTheEdge<uint8_t> bits(mask_bytes(c.reference.pixels()));
   std::vector<uint8_t> scratch;
-  foreground_mask(c.reference, c.x().data(), gain, bits.data(), &scratch);
+  find_mask(c.reference, c.x().data(), gain, bits.data(), &scratch);
   return {bits.begin(), bits.end()};
 }
 

@@ -145,8 +145,8 @@ using CountRing = RowRing<uint8_t, kMajorityReach>;
 
 }  // namespace
 
-void foreground_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-                     uint8_t* bits, std::vector<uint8_t>* scratch) {
+void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+               uint8_t* bits, std::vector<uint8_t>* scratch) {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
   const size_t pixels = reference.pixels();

@@ -28,8 +28,8 @@ inline bool is_masked(const uint8_t* bits, size_t pixel) {
 // The mask of a frame: its residual, averaged over 5 x 5 pixels, exceeds the threshold in most of
 // the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes;
 // scratch is resized as needed and can serve many calls.
-void foreground_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-                     uint8_t* bits, std::vector<uint8_t>* scratch);
+void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+               uint8_t* bits, std::vector<uint8_t>* scratch);
 
 // The frame's gain over the reference by least squares on the sampled pixels that fit it under
 // `gain`; `gain` itself where too few do.

@@ -143,7 +143,7 @@ void RobustSolver::find_foreground(const SnapshotRange& snapshots) {
     const int t = static_cast<int>(part);
     const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
                                  snapshots.plane(t, 2)};
-    foreground_mask(reference_, x, gains_[part], mask_.of(t), &scratch[worker]);
+    find_mask(reference_, x, gains_[part], mask_.of(t), &scratch[worker]);
   });
 }
 
@@ -215,6 +215,12 @@ DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, float fresh,
   if (parameters_.earlier_share > 0)
     earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh);
   model->set_gains(gains_);
+  // A pixel alone is judged more strictly than with those around it.
+  std::vector<uint8_t> limits(reference_.pixels());
+  std::transform(
+      reference_.threshold.begin(), reference_.threshold.end(), limits.begin(),
+      [](int threshold) { return static_cast<uint8_t>(std::min(255, 3 * threshold / 2)); });
+  model->set_limits(std::move(limits));
   return summary;
 }
 
