@@ -278,7 +278,7 @@ TEST(LatencyMessage, OfAnotherWindowSizeComesWithTheNextStart) {
     EXPECT_TRUE(gst_pad_query(pad, query));
     GstClockTime min = 0;
     gst_query_parse_latency(query, nullptr, &min, nullptr);
-    EXPECT_EQ((size - 1) * kFrame, min);
+    EXPECT_EQ((size - 1 + 1) * kFrame, min) << "the source has a frame's latency of its own";
     gst_query_unref(query);
     gst_object_unref(pad);
     gst_element_set_state(pipeline, GST_STATE_READY);

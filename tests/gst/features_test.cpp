@@ -321,10 +321,10 @@ TEST_P(PlanarFormats, BackgroundAndMaskAreThoseOfTheScene) {
 INSTANTIATE_TEST_SUITE_P(Sizes, PlanarFormats,
                          testing::Combine(testing::Values("GBR", "GRAY8", "I420", "NV12"),
                                           testing::Values(64, 61), testing::Values(32, 31)),
-                         [](const auto& info) {
-                           return std::string(std::get<0>(info.param)) + "_" +
-                                  std::to_string(std::get<1>(info.param)) + "x" +
-                                  std::to_string(std::get<2>(info.param));
+                         [](const auto& suite) {
+                           return std::string(std::get<0>(suite.param)) + "_" +
+                                  std::to_string(std::get<1>(suite.param)) + "x" +
+                                  std::to_string(std::get<2>(suite.param));
                          });
 
 TEST(PlanarFormats, OnePixelOfEach) {
