@@ -9,7 +9,7 @@ build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins
   libeigen3-dev libhwy-dev libopencv-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -opencv the
 # element that tests/bench compares with.
-test=(python3 python3-numpy clang-format libgtest-dev libbenchmark-dev libboost-dev
+test=(python3 python3-numpy valgrind clang-format libgtest-dev libbenchmark-dev libboost-dev
   libcli11-dev nlohmann-json3-dev gstreamer1.0-tools gstreamer1.0-plugins-base
   gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-opencv)
 # What gst/debian/control asks for beyond build; tests make a package, too.
