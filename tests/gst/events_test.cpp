@@ -288,5 +288,67 @@ TEST(LatencyMessage, OfAnotherWindowSizeComesWithTheNextStart) {
   gst_object_unref(pipeline);
 }
 
+// ---- Whole pipelines ----
+
+// Runs to the end; the pipeline is in `use`'s hands before it stops.
+void run(const std::string& text, const std::function<void(GstBin*)>& use = nullptr) {
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(text.c_str(), &error);
+  ASSERT_EQ(nullptr, error) << error->message;
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstBus* bus = gst_element_get_bus(pipeline);
+  GstMessage* end = gst_bus_timed_pop_filtered(bus, 60 * GST_SECOND,
+                                               GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  ASSERT_NE(nullptr, end) << "no end after a minute";
+  EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(end));
+  gst_message_unref(end);
+  if (use) use(GST_BIN(pipeline));
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(pipeline);
+}
+
+// The leaks tracer, under which these tests run, counts at the end.
+TEST(Pipelines, NinetyFramesLeaveNothingAlive) {
+  run("videotestsrc num-buffers=90 ! qdmdbackground window-size=30 ! fakesink");
+}
+
+void expect_none_dropped(GstBin* pipeline, const char* name, guint64 frames) {
+  GstElement* sink = gst_bin_get_by_name(pipeline, name);
+  GstStructure* stats = nullptr;
+  guint64 rendered = 0, dropped = 0;
+  g_object_get(sink, "stats", &stats, nullptr);
+  gst_structure_get(stats, "rendered", G_TYPE_UINT64, &rendered, "dropped", G_TYPE_UINT64, &dropped,
+                    nullptr);
+  EXPECT_EQ(frames, rendered) << name;
+  EXPECT_EQ(0u, dropped) << name;
+  gst_structure_free(stats);
+  gst_object_unref(sink);
+}
+
+// Half a second of latency in one branch; sinks drop what is later than 0.2 seconds. The other
+// branches' queues hold what that branch delays.
+TEST(Pipelines, ALiveTeeWithAudioBesideKeepsTime) {
+  run("videotestsrc is-live=true num-buffers=50 ! "
+      "video/x-raw,format=RGB,width=64,height=48,framerate=25/1 ! tee name=t ! queue ! "
+      "qdmdbackground window-size=13 ! videoconvert ! "
+      "fakesink name=separated sync=true max-lateness=200000000 "
+      "t. ! queue max-size-time=1000000000 max-size-buffers=0 max-size-bytes=0 ! "
+      "fakesink name=original sync=true max-lateness=200000000 "
+      "audiotestsrc is-live=true num-buffers=86 ! "
+      "queue max-size-time=1000000000 max-size-buffers=0 max-size-bytes=0 ! "
+      "fakesink name=audio sync=true max-lateness=200000000",
+      [](GstBin* pipeline) {
+        expect_none_dropped(pipeline, "separated", 50);
+        expect_none_dropped(pipeline, "original", 50);
+        expect_none_dropped(pipeline, "audio", 86);
+      });
+}
+
+TEST(Pipelines, VeryLargeFramesInAShortWindow) {
+  run("videotestsrc num-buffers=3 ! video/x-raw,format=RGB,width=8192,height=4320 ! "
+      "qdmdbackground window-size=2 ! fakesink");
+}
+
 }  // namespace
 }  // namespace qdmd::test
