@@ -44,13 +44,15 @@ def make_pipeline(options):
 
 
 def regions_of(buffer):
-    # Python can get at the metadata of one kind by its number alone; a frame's regions are numbered
-    # from 0.
-    number = 0
-    while region := GstVideo.buffer_get_video_region_of_interest_meta_id(buffer, number):
-        if GLib.quark_to_string(region.roi_type) == 'foreground':
-            yield region
-        number += 1
+    # Python finds a region by its number alone, and all may have the same: on a copy, what has been
+    # read gets another one.
+    copy = buffer.copy()
+    kind = GstVideo.video_region_of_interest_meta_api_get_type()
+    for number in range(copy.get_n_meta(kind)):
+        while region := GstVideo.buffer_get_video_region_of_interest_meta_id(copy, number):
+            if GLib.quark_to_string(region.roi_type) == 'foreground':
+                yield region
+            region.id = -1
 
 
 def print_regions(pad, info):

@@ -38,9 +38,11 @@
 #include <utility>
 
 #include "core/background/engine.h"
+#include "core/regions/regions.h"
+#include "gst/frameio.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdsettings.h"
-#include "gst/videoview.h"
+#include "gst/solvereport.h"
 
 GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -56,28 +58,44 @@ using qdmd::Status;
 // The latency of video without a frame rate is that of this rate.
 constexpr int kAssumedRate = 25;
 
-constexpr guint kStatsProperty = qdmd::kFirstFreeProperty;
+// A gap between two frames beyond which time is broken; cameras may lose some frames.
+constexpr GstClockTime kMostGap = GST_SECOND;
+constexpr int kMostGapFrames = 5;
 
-#define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
+constexpr guint kStatsProperty = qdmd::kFirstFreeProperty,
+                kBackgroundProperty = qdmd::kFirstFreeProperty + 1;
+
+#define QDMD_FORMATS \
+  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, GRAY8 }"
 
 struct UnrefBuffer {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
 };
 using BufferPtr = std::unique_ptr<GstBuffer, UnrefBuffer>;
 
+struct UnrefSample {
+  void operator()(GstSample* sample) const { gst_sample_unref(sample); }
+};
+using SamplePtr = std::unique_ptr<GstSample, UnrefSample>;
+
 struct Private {
   // Protected by the object lock.
   Settings settings;
   GstClockTime latency = 0;
-  guint64 frames_in = 0, frames_out = 0, solves = 0;
+  qdmd::Counters counters;
   bool reset_asked = false;
   qdmd::SolveReport report;
+  SamplePtr background;
 
   // Protected by the stream lock.
   Engine engine;
   // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
   // upstream's pools never wait for a window.
   std::deque<BufferPtr> shells;
+  qdmd::FrameIo io;
+  std::vector<guint8> mask, residual;  // for regions
+  guint64 solves_told = 0;
+  GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };
 
 }  // namespace
@@ -96,31 +114,6 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
 
 // ---- Properties ---------------------------------------------------------------------------------
 
-static GstStructure* make_stats(const Private* priv) {
-  const auto& report = priv->report;
-  GstStructure* stats = gst_structure_new(
-      "qdmdbackground-stats", "frames-in", G_TYPE_UINT64, priv->frames_in, "frames-out",
-      G_TYPE_UINT64, priv->frames_out, "solves", G_TYPE_UINT64, priv->solves, "window-frames",
-      G_TYPE_UINT, guint(report.window_frames), "rank", G_TYPE_UINT, guint(report.dmd.rank),
-      "background-modes", G_TYPE_UINT, guint(report.dmd.background_modes), "omega", G_TYPE_DOUBLE,
-      report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual, "condition", G_TYPE_DOUBLE,
-      report.dmd.condition, "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged), "noise",
-      G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
-      report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
-      "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
-      nullptr);
-  GValue lambda = G_VALUE_INIT, part = G_VALUE_INIT;
-  gst_value_array_init(&lambda, 2);
-  g_value_init(&part, G_TYPE_DOUBLE);
-  for (double value : {report.dmd.lambda.real(), report.dmd.lambda.imag()}) {
-    g_value_set_double(&part, value);
-    gst_value_array_append_value(&lambda, &part);
-  }
-  gst_structure_take_value(stats, "lambda", &lambda);
-  g_value_unset(&part);
-  return stats;
-}
-
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
   Private* priv = GST_QDMD_BACKGROUND(object)->priv;
@@ -136,7 +129,11 @@ static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* 
   GST_OBJECT_LOCK(object);
   bool known = qdmd::get_setting(priv->settings, id, value);
   if (id == kStatsProperty) {
-    g_value_take_boxed(value, make_stats(priv));
+    g_value_take_boxed(value, qdmd::make_stats(priv->report, priv->counters));
+    known = true;
+  }
+  if (id == kBackgroundProperty) {
+    g_value_set_boxed(value, priv->background.get());
     known = true;
   }
   GST_OBJECT_UNLOCK(object);
@@ -182,17 +179,108 @@ static bool guarded(GstQdmdBackground* self, Action action) {
 static void drop_frames(GstQdmdBackground* self) {
   self->priv->engine.flush();
   self->priv->shells.clear();
+  self->priv->next_pts = GST_CLOCK_TIME_NONE;
 }
 
 // Copies what others may want to know of the engine.
 static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 frames_out) {
   Private* priv = self->priv;
   GST_OBJECT_LOCK(self);
-  priv->frames_in += frames_in;
-  priv->frames_out += frames_out;
-  priv->solves = priv->engine.solves();
+  priv->counters.frames_in += frames_in;
+  priv->counters.frames_out += frames_out;
+  priv->counters.solves = priv->engine.solves();
   priv->report = priv->engine.report();
   GST_OBJECT_UNLOCK(self);
+}
+
+// The newest background as a buffer of the output's format, or null.
+static BufferPtr make_background(GstQdmdBackground* self) {
+  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
+  BufferPtr buffer(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(info), nullptr));
+  if (!buffer) return nullptr;
+  bool written = false;
+  {
+    MappedVideoFrame frame(info, buffer.get(), GST_MAP_WRITE);
+    if (!frame) return nullptr;
+    const bool done = guarded(self, [&] {
+      self->priv->io.write(&frame, Output::background, [&](const qdmd::MutableImageView& view) {
+        written = self->priv->engine.write_background(view);
+      });
+      return Status();
+    });
+    written = written && done;
+  }
+  if (!written) return nullptr;
+  return buffer;
+}
+
+// Says what a new solve found. The frames that wait are those that come out with it.
+static void tell_of_solve(GstQdmdBackground* self) {
+  Private* priv = self->priv;
+  if (priv->engine.solves() == priv->solves_told || priv->shells.empty()) return;
+  priv->solves_told = priv->engine.solves();
+  GstBuffer *first = priv->shells.front().get(), *last = priv->shells.back().get();
+  const GstClockTime timestamp = GST_BUFFER_PTS(first);
+  GstClockTime duration = GST_CLOCK_TIME_NONE;
+  if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
+      GST_BUFFER_PTS(last) >= timestamp)
+    duration = GST_BUFFER_PTS(last) - timestamp +
+               (GST_BUFFER_DURATION_IS_VALID(last) ? GST_BUFFER_DURATION(last) : 0);
+
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  SamplePtr sample;
+  GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(self));
+  if (BufferPtr picture = caps ? make_background(self) : nullptr) {
+    GST_BUFFER_PTS(picture.get()) = timestamp;
+    GST_BUFFER_DURATION(picture.get()) = duration;
+    sample.reset(gst_sample_new(picture.get(), caps, &segment, nullptr));
+  }
+  if (caps) gst_caps_unref(caps);
+
+  GST_OBJECT_LOCK(self);
+  const bool post = priv->settings.post_messages;
+  if (sample) std::swap(priv->background, sample);
+  GST_OBJECT_UNLOCK(self);
+  // The old sample ends here, without the lock.
+  sample.reset();
+  if (post)
+    gst_element_post_message(
+        GST_ELEMENT(self),
+        gst_message_new_element(
+            GST_OBJECT(self),
+            qdmd::make_solve_message(priv->engine.report(), segment, timestamp, duration)));
+}
+
+// Sets controlled properties to what they are at the time of `buffer`.
+static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  if (segment.format != GST_FORMAT_TIME || !GST_BUFFER_PTS_IS_VALID(buffer)) return;
+  const guint64 time =
+      gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+  if (GST_CLOCK_TIME_IS_VALID(time)) gst_object_sync_values(GST_OBJECT(self), time);
+}
+
+// Regions of the frame that comes out next.
+static std::vector<qdmd::Region> next_regions(GstQdmdBackground* self, int least_area) {
+  Private* priv = self->priv;
+  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
+  const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
+  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  priv->mask.resize(pixels);
+  priv->residual.resize(pixels);
+  priv->engine.foreground(priv->mask.data(), priv->residual.data());
+  return qdmd::find_regions(priv->mask.data(), priv->residual.data(), width, height, least_area);
+}
+
+static void attach(GstBuffer* buffer, const std::vector<qdmd::Region>& regions) {
+  for (const qdmd::Region& region : regions) {
+    auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", guint(region.x),
+                                                              guint(region.y), guint(region.width),
+                                                              guint(region.height));
+    gst_video_region_of_interest_meta_add_param(
+        meta, gst_structure_new("foreground", "area", G_TYPE_UINT, guint(region.area),
+                                "mean-residual", G_TYPE_DOUBLE, region.mean_residual, nullptr));
+  }
 }
 
 // The next ready frame as a buffer from the output pool, or null with OK where none is ready.
@@ -202,31 +290,36 @@ static GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   *out = nullptr;
   if (!priv->engine.ready()) return GST_FLOW_OK;
 
-  GST_OBJECT_LOCK(self);
-  const Output output = priv->settings.output;
-  const double threshold = priv->settings.engine.foreground_threshold;
-  GST_OBJECT_UNLOCK(self);
-
   const BufferPtr shell = std::move(priv->shells.front());
   priv->shells.pop_front();
+  follow_controllers(self, shell.get());
+  GST_OBJECT_LOCK(self);
+  const Settings settings = priv->settings;
+  GST_OBJECT_UNLOCK(self);
+
   GstBuffer* made = nullptr;
   const GstFlowReturn flow =
       GST_BASE_TRANSFORM_CLASS(parent_class)->prepare_output_buffer(trans, shell.get(), &made);
   BufferPtr buffer(made);
   if (flow != GST_FLOW_OK || !buffer) return flow;
+  std::vector<qdmd::Region> regions;
   {
-    const MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
+    MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
     if (!frame) {
       GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
       return GST_FLOW_ERROR;
     }
     const bool written = guarded(self, [&] {
-      priv->engine.set_foreground_threshold(threshold);
-      priv->engine.pop(output, frame.view<uint8_t>());
+      priv->engine.set_foreground_threshold(settings.engine.foreground_threshold);
+      if (settings.regions) regions = next_regions(self, settings.regions_min_area);
+      priv->io.write(&frame, settings.output, [&](const qdmd::MutableImageView& view) {
+        priv->engine.pop(settings.output, view);
+      });
       return Status();
     });
     if (!written) return GST_FLOW_ERROR;
   }
+  attach(buffer.get(), regions);
   publish_report(self, 0, 1);
   *out = buffer.release();
   return GST_FLOW_OK;
@@ -240,6 +333,7 @@ static GstFlowReturn drain(GstQdmdBackground* self) {
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(priv->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
   if (!guarded(self, [&] { return priv->engine.drain(); })) flow = GST_FLOW_ERROR;
+  if (flow == GST_FLOW_OK) tell_of_solve(self);
   while (flow == GST_FLOW_OK && priv->engine.ready()) {
     GstBuffer* buffer = nullptr;
     flow = next_output(self, &buffer);
@@ -253,18 +347,45 @@ static GstFlowReturn drain(GstQdmdBackground* self) {
   return flow;
 }
 
+// True where `input` does not follow the frame before: time goes back, or leaves out more than a
+// camera loses. Notes where the next frame is expected.
+static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
+  GstClockTime* next = &self->priv->next_pts;
+  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
+  const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
+  const bool has_rate = GST_VIDEO_INFO_FPS_N(info) > 0;
+  GstClockTime frame = GST_BUFFER_DURATION(input);
+  if (has_rate)
+    frame = gst_util_uint64_scale(GST_SECOND, guint64(GST_VIDEO_INFO_FPS_D(info)),
+                                  guint64(GST_VIDEO_INFO_FPS_N(info)));
+  *next = GST_CLOCK_TIME_NONE;
+  // Frames of reverse playback come in reverse order.
+  if (!GST_CLOCK_TIME_IS_VALID(pts) || GST_BASE_TRANSFORM(self)->segment.rate < 0) return false;
+  if (!GST_CLOCK_TIME_IS_VALID(frame)) frame = 0;
+  *next = pts + frame;
+  if (!GST_CLOCK_TIME_IS_VALID(expected)) return false;
+  // Rounded timestamps may fall short by some.
+  if (pts + MAX(frame, 10 * GST_MSECOND) < expected) return true;
+  // Without a rate nobody knows how long a frame lasts.
+  return has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
+}
+
 static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* trans,
                                                              gboolean is_discont,
                                                              GstBuffer* input) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
   Private* priv = self->priv;
+  follow_controllers(self, input);
   GST_OBJECT_LOCK(self);
   const bool reset = std::exchange(priv->reset_asked, false);
   const bool freeze = priv->settings.freeze;
+  const int threads = priv->settings.engine.threads;
   GST_OBJECT_UNLOCK(self);
   // The base class keeps is_discont set until something was pushed, which can be a window later:
   // the buffer's own flag says where time breaks.
-  if (GST_BUFFER_IS_DISCONT(input) || reset) {
+  const bool jump = time_jumps(self, input);
+  if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
+  if (GST_BUFFER_IS_DISCONT(input) || jump || reset) {
     const GstFlowReturn flow = drain(self);
     if (flow != GST_FLOW_OK) {
       gst_buffer_unref(input);
@@ -299,7 +420,8 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
     const bool taken = guarded(self, [&] {
       priv->shells.push_back(std::move(shell));
       priv->engine.set_freeze(freeze);
-      return priv->engine.push(frame.view<const uint8_t>());
+      priv->engine.set_threads(threads);
+      return priv->engine.push(priv->io.read(frame));
     });
     if (!taken) {
       drop_frames(self);
@@ -307,6 +429,7 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
     }
   }
   publish_report(self, 1, 0);
+  tell_of_solve(self);
   return GST_FLOW_OK;
 }
 
@@ -333,6 +456,8 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, G
   GST_OBJECT_UNLOCK(self);
 
   priv->shells.clear();
+  priv->solves_told = 0;
+  priv->next_pts = GST_CLOCK_TIME_NONE;
   const bool configured = guarded(self, [&] {
     return priv->engine.configure(settings.engine, GST_VIDEO_INFO_WIDTH(in),
                                   GST_VIDEO_INFO_HEIGHT(in));
@@ -425,8 +550,9 @@ static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
   Private* priv = self->priv;
   GST_OBJECT_LOCK(self);
-  priv->frames_in = priv->frames_out = priv->solves = 0;
+  priv->counters = {};
   priv->report = qdmd::SolveReport();
+  const SamplePtr old = std::move(priv->background);
   GST_OBJECT_UNLOCK(self);
   return TRUE;
 }
@@ -475,6 +601,12 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
                          "foreground-ratio (0 to 1), gram-time and solve-time in seconds",
                          GST_TYPE_STRUCTURE,
                          GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  g_object_class_install_property(
+      object_class, kBackgroundProperty,
+      g_param_spec_boxed("background", "Background",
+                         "The newest background picture in the output's caps, with the time of the "
+                         "frames that came out with its solve; null before the first solve",
+                         GST_TYPE_SAMPLE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   /**
    * GstQdmdBackground::reset:
    *

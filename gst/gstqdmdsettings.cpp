@@ -11,6 +11,7 @@ constexpr auto kAtStart =
     GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
 constexpr auto kAnyTime =
     GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+constexpr auto kControllable = GParamFlags(kAnyTime | GST_PARAM_CONTROLLABLE);
 
 struct Property {
   GParamSpec* (*spec)(const Settings& defaults);
@@ -25,6 +26,9 @@ struct Property {
 #define QDMD_UINT(member)                                                  \
   [](Settings& s, const GValue* v) { member = int(g_value_get_uint(v)); }, \
       [](const Settings& s, GValue* v) { g_value_set_uint(v, guint(member)); }
+#define QDMD_BOOLEAN(member)                                             \
+  [](Settings& s, const GValue* v) { member = g_value_get_boolean(v); }, \
+      [](const Settings& s, GValue* v) { g_value_set_boolean(v, member); }
 #define QDMD_DOUBLE(member)                                             \
   [](Settings& s, const GValue* v) { member = g_value_get_double(v); }, \
       [](const Settings& s, GValue* v) { g_value_set_double(v, member); }
@@ -32,7 +36,8 @@ struct Property {
 const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum("output", "Output", "What is sent on in place of each frame",
-                                gst_qdmd_background_output_get_type(), gint(d.output), kAnyTime);
+                                gst_qdmd_background_output_get_type(), gint(d.output),
+                                kControllable);
      },
      QDMD_ENUM(s.output)},
     {[](const Settings& d) {
@@ -65,8 +70,8 @@ const Property kProperties[] = {
      QDMD_ENUM(s.engine.dmd.method)},
     {[](const Settings& d) {
        return g_param_spec_uint("rank", "Rank",
-                                "Singular values that the decomposition keeps (0: all); rank 1 is "
-                                "the steadiest where people stand still",
+                                "Singular values that the decomposition keeps (0: all for qdmd and "
+                                "dmd, 1 for robust)",
                                 0, guint(EngineOptions::kMaxWindow), guint(d.engine.dmd.rank),
                                 kAtStart);
      },
@@ -93,8 +98,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("sample-step", "Sample step",
                                 "The decomposition sees every k-th pixel in x and y; the output "
-                                "stays full size (0: all pixels; no coarser step kept the "
-                                "background of every test sequence within 0.1 level)",
+                                "stays full size (0: all pixels for qdmd and dmd, about 120 along "
+                                "the short side for robust)",
                                 0, guint(EngineOptions::kMaxSampleStep),
                                 guint(d.engine.sample_step), kAtStart);
      },
@@ -111,8 +116,8 @@ const Property kProperties[] = {
        return g_param_spec_double("foreground-threshold", "Foreground threshold",
                                   "Distance from the background, the length of the RGB difference "
                                   "in grey levels, above which a pixel is foreground (0: from the "
-                                  "noise of the window, at least 18)",
-                                  0, 442, d.engine.foreground_threshold, kAnyTime);
+                                  "noise of the window, for robust of each pixel, at least 18)",
+                                  0, 442, d.engine.foreground_threshold, kControllable);
      },
      QDMD_DOUBLE(s.engine.foreground_threshold)},
     {[](const Settings& d) {
@@ -127,17 +132,36 @@ const Property kProperties[] = {
                                 "Threads that work on a window (0: one for each core); the "
                                 "pictures are the same for any number",
                                 0, guint(EngineOptions::kMaxThreads), guint(d.engine.threads),
-                                kAtStart);
+                                kAnyTime);
      },
      QDMD_UINT(s.engine.threads)},
     {[](const Settings& d) {
        return g_param_spec_boolean("freeze", "Freeze",
                                    "Keep the background as it is and solve no more; before there "
                                    "is a model, one is made (mode=batch: from the next window on)",
-                                   d.freeze, kAnyTime);
+                                   d.freeze, kControllable);
      },
-     [](Settings& s, const GValue* v) { s.freeze = g_value_get_boolean(v); },
-     [](const Settings& s, GValue* v) { g_value_set_boolean(v, s.freeze); }},
+     QDMD_BOOLEAN(s.freeze)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean("post-messages", "Post messages",
+                                   "Post an element message `qdmdbackground` for each solve",
+                                   d.post_messages, kAnyTime);
+     },
+     QDMD_BOOLEAN(s.post_messages)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean("regions", "Regions",
+                                   "Attach a GstVideoRegionOfInterestMeta of type `foreground` to "
+                                   "each output buffer for each region of foreground",
+                                   d.regions, kAnyTime);
+     },
+     QDMD_BOOLEAN(s.regions)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("regions-min-area", "Least area of regions",
+                                "Pixels of foreground that a region has at least (0: 1/2000 of "
+                                "the picture, at least 4)",
+                                0, G_MAXINT, guint(d.regions_min_area), kAnyTime);
+     },
+     QDMD_UINT(s.regions_min_area)},
 };
 
 }  // namespace

@@ -16,8 +16,8 @@ constexpr int kGramGroup = 16;
 // Pixels whose share of a pass is worth waking a thread for.
 constexpr size_t kPixelsPerPart = 32768;
 
-int thread_count(const EngineOptions& options) {
-  if (options.threads > 0) return options.threads;
+int thread_count(int threads) {
+  if (threads > 0) return threads;
   // Zero where the system does not tell.
   return static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1,
                                                unsigned{EngineOptions::kMaxThreads}));
@@ -49,7 +49,8 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   options_ = options;
   width_ = width;
   height_ = height;
-  const int threads = thread_count(options);
+  threads_ = options.threads;
+  const int threads = thread_count(options.threads);
   pool_ = std::make_unique<Pool>(threads);
   side_ = std::make_unique<SideThread>(threads > 1);
   DmdOptions dmd = options.dmd;
@@ -105,11 +106,22 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
   if (frame.width != width_ || frame.height != height_)
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
+  follow_threads();
   if (options_.mode == Mode::live)
     push_live(frame);
   else
     push_batch(frame);
   return {};
+}
+
+// The pictures are the same for any number.
+void Engine::follow_threads() {
+  if (threads_ == options_.threads || !side_->idle()) return;
+  options_.threads = std::clamp(threads_, 0, EngineOptions::kMaxThreads);
+  threads_ = options_.threads;
+  const int threads = thread_count(threads_);
+  pool_->resize(threads);
+  side_->set_active(threads > 1);
 }
 
 void Engine::push_batch(const ImageView& frame) {
@@ -213,19 +225,42 @@ void Engine::set_foreground_threshold(double threshold) {
   foreground.threshold = threshold > 0 ? threshold : automatic_threshold(foreground.noise);
 }
 
-void Engine::pop(Output output, const MutableImageView& out) {
-  if (ready_ == 0) return;
+// What is needed for the next frame's pictures.
+OutputTask Engine::next_task(Output output) {
   const int index = window_.size() - pending_;
   const int slot = window_.slot(index);
   BackgroundModel& model = solver_.model();
   model.set_time(options_.mode == Mode::live ? live_.time() : index);
-  const OutputTask task = {{window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
-                           &model,
-                           output,
-                           solver_.report().foreground.threshold,
-                           options_.foreground_threshold > 0 ? nullptr : model.limits(),
-                           alpha_.samples(slot),
-                           alpha_.constant(slot)};
+  return {{window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
+          &model,
+          output,
+          solver_.report().foreground.threshold,
+          options_.foreground_threshold > 0 ? nullptr : model.limits(),
+          alpha_.samples(slot),
+          alpha_.constant(slot)};
+}
+
+void Engine::foreground(uint8_t* mask, uint8_t* residual) {
+  if (ready_ == 0) return;
+  write_foreground(next_task(Output::mask), 0, window_.pixels(), mask, residual);
+}
+
+bool Engine::write_background(const MutableImageView& out) {
+  if (!has_model_ || window_.size() == 0) return false;
+  solver_.model().set_time(options_.mode == Mode::live ? live_.time() : window_.size() - 1);
+  OutputTask task = {};
+  task.model = &solver_.model();
+  task.output = Output::background;
+  task.constant_alpha = 255;
+  // The background needs no frame, but rows of one are skipped over.
+  for (int c = 0; c < kChannels; ++c) task.x[c] = window_.plane(window_.slot(0), c);
+  write_output(task, out, 0, height_);
+  return true;
+}
+
+void Engine::pop(Output output, const MutableImageView& out) {
+  if (ready_ == 0) return;
+  const OutputTask task = next_task(output);
   if (side_->idle())
     for_bands(*pool_, width_, height_,
               [&](int first, int count) { write_output(task, out, first, count); });

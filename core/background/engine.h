@@ -37,6 +37,11 @@ class Engine {
   bool ready() const { return ready_ > 0; }
   // Writes the next frame's picture. Call only while ready(); `out` has the configured size.
   void pop(Output output, const MutableImageView& out);
+  // Of the frame that pop() gives next, width * height samples each: its mask, as Output::mask has
+  // it, and the lengths of its residuals in levels, at most 255. Call only while ready().
+  void foreground(uint8_t* mask, uint8_t* residual);
+  // Writes the newest background: that of the newest frame pushed. False: there is none yet.
+  bool write_background(const MutableImageView& out);
   // Makes every waiting frame ready. The frame after it belongs to a new window: time is broken.
   Status drain();
   // Drops all frames and forgets the window and the model.
@@ -52,8 +57,12 @@ class Engine {
   // While on, the background stays the picture that it was, and nothing is solved; only the first
   // model is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
+  // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
+  void set_threads(int threads) { threads_ = threads; }
 
  private:
+  OutputTask next_task(Output output);
+  void follow_threads();
   void take_in(const ImageView& frame);
   void push_batch(const ImageView& frame);
   void push_live(const ImageView& frame);
@@ -80,6 +89,7 @@ class Engine {
   std::optional<Group> group_;  // batch: what the side thread is at
   bool has_model_ = false, start_new_window_ = false;
   bool freeze_ = false, frozen_ = false;  // as asked for, and as done
+  int threads_ = 0;                       // as asked for; options_ has what is done
 
   // The last member: it ends before what it works on.
   std::unique_ptr<SideThread> side_;

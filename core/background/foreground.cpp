@@ -123,4 +123,17 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
     }
 }
 
+void write_foreground(const OutputTask& task, size_t first, size_t count, uint8_t* mask,
+                      uint8_t* residual) {
+  BackgroundRun background;
+  for (size_t done = 0; done < count; done += kMaxRun) {
+    const size_t from = first + done, run = std::min(kMaxRun, count - done);
+    task.model->evaluate(from, run, background.rows);
+    const uint8_t* const x[3] = {task.x[0] + from, task.x[1] + from, task.x[2] + from};
+    foreground_mask(x, background.rows, run, task.threshold,
+                    task.limits ? task.limits + from : nullptr, mask + done);
+    residual_norm(x, background.rows, run, residual + done);
+  }
+}
+
 }  // namespace qdmd

@@ -46,4 +46,9 @@ struct OutputTask {
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count);
 
+// The mask of pixels first .. first + count - 1, as Output::mask has it, and the lengths of their
+// residuals in levels, at most 255. The task's output does not matter.
+void write_foreground(const OutputTask& task, size_t first, size_t count, uint8_t* mask,
+                      uint8_t* residual);
+
 }  // namespace qdmd

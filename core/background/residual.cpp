@@ -65,6 +65,18 @@ size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, ui
                 : exceed_limits<false>(x, l, count, limit, nullptr, out);
 }
 
+// A plain loop, which the compiler makes vectors of for each instruction set.
+void norm_row(const uint8_t* HWY_RESTRICT xr, const uint8_t* HWY_RESTRICT xg,
+              const uint8_t* HWY_RESTRICT xb, const uint8_t* HWY_RESTRICT lr,
+              const uint8_t* HWY_RESTRICT lg, const uint8_t* HWY_RESTRICT lb, size_t count,
+              uint8_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; ++i) {
+    const int r = xr[i] - lr[i], g = xg[i] - lg[i], b = xb[i] - lb[i];
+    const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
+    out[i] = static_cast<uint8_t>(static_cast<int>(norm < 255.0f ? norm : 255.0f));
+  }
+}
+
 size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
   const hn::ScalableTag<uint8_t> d;
   size_t p = 0;
@@ -84,12 +96,18 @@ namespace {
 HWY_EXPORT(differ);
 HWY_EXPORT(exceed);
 HWY_EXPORT(mask_samples);
+HWY_EXPORT(norm_row);
 
 }  // namespace
 
 void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out) {
   for (size_t p = HWY_DYNAMIC_DISPATCH(differ)(x, l, count, out); p < count; ++p)
     out[p] = static_cast<uint8_t>(std::abs(x[p] - l[p]));
+}
+
+void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
+                   uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(norm_row)(x[0], x[1], x[2], l[0], l[1], l[2], count, out);
 }
 
 void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,

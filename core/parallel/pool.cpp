@@ -5,7 +5,16 @@
 
 namespace qdmd {
 
-Pool::Pool(int threads) {
+Pool::Pool(int threads) { start(threads); }
+
+Pool::~Pool() { stop(); }
+
+void Pool::resize(int threads) {
+  stop();
+  start(threads);
+}
+
+void Pool::start(int threads) {
   const auto wanted = static_cast<size_t>(std::max(threads, 1)) - 1;
   workers_.reserve(wanted);
   try {
@@ -16,13 +25,15 @@ Pool::Pool(int threads) {
   }
 }
 
-Pool::~Pool() {
+void Pool::stop() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   wake_.notify_all();
   for (std::thread& worker : workers_) worker.join();
+  workers_.clear();
+  stopping_ = false;
 }
 
 void Pool::do_parts(const Job& job, size_t parts, size_t worker) noexcept {

@@ -26,6 +26,9 @@ class Pool {
   // Not while run() runs.
   ~Pool();
 
+  // From now on `threads` work. Not while run() runs.
+  void resize(int threads);
+
   // Threads that work, the caller's included; at least 1.
   size_t threads() const { return workers_.size() + 1; }
 
@@ -52,6 +55,8 @@ class Pool {
     const void* task = nullptr;
   };
 
+  void start(int threads);
+  void stop();
   void run_job(size_t parts, Job job) noexcept;
   void work(size_t worker) noexcept;
   void do_parts(const Job& job, size_t parts, size_t worker) noexcept;

@@ -6,7 +6,20 @@
 namespace qdmd {
 
 SideThread::SideThread(bool active) {
-  if (!active) return;
+  if (active) begin();
+}
+
+SideThread::~SideThread() { end(); }
+
+void SideThread::set_active(bool active) {
+  if (active == thread_.joinable()) return;
+  if (active)
+    begin();
+  else
+    end();
+}
+
+void SideThread::begin() {
   try {
     thread_ = std::thread([this] { loop(); });
   } catch (const std::system_error&) {
@@ -14,7 +27,7 @@ SideThread::SideThread(bool active) {
   }
 }
 
-SideThread::~SideThread() {
+void SideThread::end() {
   if (!thread_.joinable()) return;
   {
     const std::lock_guard lock(mutex_);
@@ -22,6 +35,7 @@ SideThread::~SideThread() {
   }
   changed_.notify_all();
   thread_.join();
+  stopping_ = false;
 }
 
 void SideThread::run() noexcept {

@@ -20,6 +20,8 @@ class SideThread {
   // Waits for the function that runs, whose exception is lost.
   ~SideThread();
 
+  // As `active` of the constructor, from the next start() on. While nothing runs.
+  void set_active(bool active);
   // Runs `work`; the one before must have been finished.
   void start(std::function<void()> work);
   // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
@@ -28,6 +30,8 @@ class SideThread {
   bool idle();
 
  private:
+  void begin();
+  void end();
   void loop() noexcept;
   void run() noexcept;
 

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "core/background/residual.h"
+
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/background/robust/mask.cpp"
@@ -19,18 +21,6 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Plain loops over one row, which the compiler makes vectors of for each instruction set.
-
-// The quaternion norm of x - l, rounded down, at most 255.
-void norm_row(const uint8_t* HWY_RESTRICT xr, const uint8_t* HWY_RESTRICT xg,
-              const uint8_t* HWY_RESTRICT xb, const uint8_t* HWY_RESTRICT lr,
-              const uint8_t* HWY_RESTRICT lg, const uint8_t* HWY_RESTRICT lb, size_t count,
-              uint8_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i) {
-    const int r = xr[i] - lr[i], g = xg[i] - lg[i], b = xb[i] - lb[i];
-    const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
-    out[i] = static_cast<uint8_t>(static_cast<int>(norm < 255.0f ? norm : 255.0f));
-  }
-}
 
 void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
                uint8_t* HWY_RESTRICT out) {
@@ -103,7 +93,6 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
-HWY_EXPORT(norm_row);
 HWY_EXPORT(scale_row);
 HWY_EXPORT(sum_five_columns);
 HWY_EXPORT(sum_five_rows);
@@ -174,8 +163,8 @@ void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain
       HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, gain[c], lit_rows[c]);
       l[c] = lit_rows[c];
     }
-    HWY_DYNAMIC_DISPATCH(norm_row)
-    (x[0] + start, x[1] + start, x[2] + start, l[0], l[1], l[2], width, norm);
+    const uint8_t* const row_of_x[3] = {x[0] + start, x[1] + start, x[2] + start};
+    residual_norm(row_of_x, l, width, norm);
     pad_row(norm, width, kMeanReach, padded);
     HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, sums.of(row));
   };

@@ -1,0 +1,21 @@
+// What a solve found, as GStreamer structures.
+#pragma once
+
+#include <gst/gst.h>
+
+#include "core/background/window_solver.h"
+
+namespace qdmd {
+
+struct Counters {
+  guint64 frames_in = 0, frames_out = 0, solves = 0;
+};
+
+// The property `stats`.
+GstStructure* make_stats(const SolveReport& report, const Counters& counters);
+
+// The element message of a solve. timestamp and duration: of the frames that come out with it.
+GstStructure* make_solve_message(const SolveReport& report, const GstSegment& segment,
+                                 GstClockTime timestamp, GstClockTime duration);
+
+}  // namespace qdmd
