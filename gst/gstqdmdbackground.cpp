@@ -31,36 +31,20 @@
  */
 #include "gst/gstqdmdbackground.h"
 
-#include <deque>
-#include <exception>
-#include <memory>
-#include <new>
 #include <utility>
 
-#include "core/background/engine.h"
-#include "core/regions/regions.h"
-#include "gst/frameio.h"
 #include "gst/gstqdmdenums.h"
-#include "gst/gstqdmdsettings.h"
-#include "gst/solvereport.h"
+#include "gst/gstqdmdframes.h"
 
-GST_DEBUG_CATEGORY_STATIC(qdmd_background_debug);
+GST_DEBUG_CATEGORY(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
 
 namespace {
 
-using qdmd::Engine;
-using qdmd::MappedVideoFrame;
-using qdmd::Output;
 using qdmd::Settings;
-using qdmd::Status;
 
 // The latency of video without a frame rate is that of this rate.
 constexpr int kAssumedRate = 25;
-
-// A gap between two frames beyond which time is broken; cameras may lose some frames.
-constexpr GstClockTime kMostGap = GST_SECOND;
-constexpr int kMostGapFrames = 5;
 
 constexpr guint kStatsProperty = qdmd::kFirstFreeProperty,
                 kBackgroundProperty = qdmd::kFirstFreeProperty + 1;
@@ -68,42 +52,7 @@ constexpr guint kStatsProperty = qdmd::kFirstFreeProperty,
 #define QDMD_FORMATS \
   "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, GRAY8 }"
 
-struct UnrefBuffer {
-  void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
-};
-using BufferPtr = std::unique_ptr<GstBuffer, UnrefBuffer>;
-
-struct UnrefSample {
-  void operator()(GstSample* sample) const { gst_sample_unref(sample); }
-};
-using SamplePtr = std::unique_ptr<GstSample, UnrefSample>;
-
-struct Private {
-  // Protected by the object lock.
-  Settings settings;
-  GstClockTime latency = 0;
-  qdmd::Counters counters;
-  bool reset_asked = false;
-  qdmd::SolveReport report;
-  SamplePtr background;
-
-  // Protected by the stream lock.
-  Engine engine;
-  // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
-  // upstream's pools never wait for a window.
-  std::deque<BufferPtr> shells;
-  qdmd::FrameIo io;
-  std::vector<guint8> mask, residual;  // for regions
-  guint64 solves_told = 0;
-  GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
-};
-
 }  // namespace
-
-struct _GstQdmdBackground {
-  GstVideoFilter parent;
-  Private* priv;
-};
 
 #define gst_qdmd_background_parent_class parent_class
 G_DEFINE_TYPE_WITH_CODE(GstQdmdBackground, gst_qdmd_background, GST_TYPE_VIDEO_FILTER,
@@ -116,325 +65,49 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
 
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
-  Private* priv = GST_QDMD_BACKGROUND(object)->priv;
+  qdmd::Frames* frames = GST_QDMD_BACKGROUND(object)->frames;
   GST_OBJECT_LOCK(object);
-  const bool known = qdmd::set_setting(&priv->settings, id, value);
+  const bool known = qdmd::set_setting(&frames->settings, id, value);
   GST_OBJECT_UNLOCK(object);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* value,
                                              GParamSpec* spec) {
-  Private* priv = GST_QDMD_BACKGROUND(object)->priv;
+  qdmd::Frames* frames = GST_QDMD_BACKGROUND(object)->frames;
   GST_OBJECT_LOCK(object);
-  bool known = qdmd::get_setting(priv->settings, id, value);
+  bool known = qdmd::get_setting(frames->settings, id, value);
   if (id == kStatsProperty) {
-    g_value_take_boxed(value, qdmd::make_stats(priv->report, priv->counters));
+    g_value_take_boxed(value, qdmd::make_stats(frames->report, frames->counters));
     known = true;
   }
   if (id == kBackgroundProperty) {
-    g_value_set_boxed(value, priv->background.get());
+    g_value_set_boxed(value, frames->background.get());
     known = true;
   }
   GST_OBJECT_UNLOCK(object);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
-// ---- Frames through the engine ------------------------------------------------------------------
-
-// Posts what a refused engine call said. Called without locks.
-static void post_status(GstQdmdBackground* self, const Status& status) {
-  switch (status.code) {
-    case Status::Code::too_much_memory:
-      GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("%s", status.message.c_str()), (nullptr));
-      break;
-    case Status::Code::invalid_options:
-      GST_ELEMENT_ERROR(self, LIBRARY, SETTINGS, ("%s", status.message.c_str()), (nullptr));
-      break;
-    default:
-      GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", status.message.c_str()));
-      break;
-  }
-}
-
-// Runs `action` (returning Status); true if it succeeded, else an error is posted. No exception
-// gets past this.
-template <typename Action>
-static bool guarded(GstQdmdBackground* self, Action action) {
-  try {
-    const Status status = action();
-    if (status.ok()) return true;
-    post_status(self, status);
-  } catch (const std::bad_alloc&) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("Not enough memory for the window: lower window-size or scale the video "
-                       "down."),
-                      (nullptr));
-  } catch (const std::exception& error) {
-    GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", error.what()));
-  }
-  return false;
-}
-
-static void drop_frames(GstQdmdBackground* self) {
-  self->priv->engine.flush();
-  self->priv->shells.clear();
-  self->priv->next_pts = GST_CLOCK_TIME_NONE;
-}
-
-// Copies what others may want to know of the engine.
-static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 frames_out) {
-  Private* priv = self->priv;
-  GST_OBJECT_LOCK(self);
-  priv->counters.frames_in += frames_in;
-  priv->counters.frames_out += frames_out;
-  priv->counters.solves = priv->engine.solves();
-  priv->report = priv->engine.report();
-  GST_OBJECT_UNLOCK(self);
-}
-
-// The newest background as a buffer of the output's format, or null.
-static BufferPtr make_background(GstQdmdBackground* self) {
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
-  BufferPtr buffer(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(info), nullptr));
-  if (!buffer) return nullptr;
-  bool written = false;
-  {
-    MappedVideoFrame frame(info, buffer.get(), GST_MAP_WRITE);
-    if (!frame) return nullptr;
-    const bool done = guarded(self, [&] {
-      self->priv->io.write(&frame, Output::background, [&](const qdmd::MutableImageView& view) {
-        written = self->priv->engine.write_background(view);
-      });
-      return Status();
-    });
-    written = written && done;
-  }
-  if (!written) return nullptr;
-  return buffer;
-}
-
-// Says what a new solve found. The frames that wait are those that come out with it.
-static void tell_of_solve(GstQdmdBackground* self) {
-  Private* priv = self->priv;
-  if (priv->engine.solves() == priv->solves_told || priv->shells.empty()) return;
-  priv->solves_told = priv->engine.solves();
-  GstBuffer *first = priv->shells.front().get(), *last = priv->shells.back().get();
-  const GstClockTime timestamp = GST_BUFFER_PTS(first);
-  GstClockTime duration = GST_CLOCK_TIME_NONE;
-  if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
-      GST_BUFFER_PTS(last) >= timestamp)
-    duration = GST_BUFFER_PTS(last) - timestamp +
-               (GST_BUFFER_DURATION_IS_VALID(last) ? GST_BUFFER_DURATION(last) : 0);
-
-  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  SamplePtr sample;
-  GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(self));
-  if (BufferPtr picture = caps ? make_background(self) : nullptr) {
-    GST_BUFFER_PTS(picture.get()) = timestamp;
-    GST_BUFFER_DURATION(picture.get()) = duration;
-    sample.reset(gst_sample_new(picture.get(), caps, &segment, nullptr));
-  }
-  if (caps) gst_caps_unref(caps);
-
-  GST_OBJECT_LOCK(self);
-  const bool post = priv->settings.post_messages;
-  if (sample) std::swap(priv->background, sample);
-  GST_OBJECT_UNLOCK(self);
-  // The old sample ends here, without the lock.
-  sample.reset();
-  if (post)
-    gst_element_post_message(
-        GST_ELEMENT(self),
-        gst_message_new_element(
-            GST_OBJECT(self),
-            qdmd::make_solve_message(priv->engine.report(), segment, timestamp, duration)));
-}
-
-// Sets controlled properties to what they are at the time of `buffer`.
-static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
-  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  if (segment.format != GST_FORMAT_TIME || !GST_BUFFER_PTS_IS_VALID(buffer)) return;
-  const guint64 time =
-      gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
-  if (GST_CLOCK_TIME_IS_VALID(time)) gst_object_sync_values(GST_OBJECT(self), time);
-}
-
-// Regions of the frame that comes out next.
-static std::vector<qdmd::Region> next_regions(GstQdmdBackground* self, int least_area) {
-  Private* priv = self->priv;
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
-  const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
-  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  priv->mask.resize(pixels);
-  priv->residual.resize(pixels);
-  priv->engine.foreground(priv->mask.data(), priv->residual.data());
-  return qdmd::find_regions(priv->mask.data(), priv->residual.data(), width, height, least_area);
-}
-
-static void attach(GstBuffer* buffer, const std::vector<qdmd::Region>& regions) {
-  for (const qdmd::Region& region : regions) {
-    auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", guint(region.x),
-                                                              guint(region.y), guint(region.width),
-                                                              guint(region.height));
-    gst_video_region_of_interest_meta_add_param(
-        meta, gst_structure_new("foreground", "area", G_TYPE_UINT, guint(region.area),
-                                "mean-residual", G_TYPE_DOUBLE, region.mean_residual, nullptr));
-  }
-}
-
-// The next ready frame as a buffer from the output pool, or null with OK where none is ready.
-static GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
-  Private* priv = self->priv;
-  GstBaseTransform* trans = GST_BASE_TRANSFORM(self);
-  *out = nullptr;
-  if (!priv->engine.ready()) return GST_FLOW_OK;
-
-  const BufferPtr shell = std::move(priv->shells.front());
-  priv->shells.pop_front();
-  follow_controllers(self, shell.get());
-  GST_OBJECT_LOCK(self);
-  const Settings settings = priv->settings;
-  GST_OBJECT_UNLOCK(self);
-
-  GstBuffer* made = nullptr;
-  const GstFlowReturn flow =
-      GST_BASE_TRANSFORM_CLASS(parent_class)->prepare_output_buffer(trans, shell.get(), &made);
-  BufferPtr buffer(made);
-  if (flow != GST_FLOW_OK || !buffer) return flow;
-  std::vector<qdmd::Region> regions;
-  {
-    MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
-    if (!frame) {
-      GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
-      return GST_FLOW_ERROR;
-    }
-    const bool written = guarded(self, [&] {
-      priv->engine.set_foreground_threshold(settings.engine.foreground_threshold);
-      if (settings.regions) regions = next_regions(self, settings.regions_min_area);
-      priv->io.write(&frame, settings.output, [&](const qdmd::MutableImageView& view) {
-        priv->engine.pop(settings.output, view);
-      });
-      return Status();
-    });
-    if (!written) return GST_FLOW_ERROR;
-  }
-  attach(buffer.get(), regions);
-  publish_report(self, 0, 1);
-  *out = buffer.release();
-  return GST_FLOW_OK;
-}
-
-// Solves for what is left and pushes it; the next frame begins a new window. The caller holds the
-// stream lock: sink events that are serialized, and the streaming thread.
-static GstFlowReturn drain(GstQdmdBackground* self) {
-  Private* priv = self->priv;
-  if (!priv->engine.configured()) return GST_FLOW_OK;
-  GST_DEBUG_OBJECT(self, "draining %u frames", guint(priv->shells.size()));
-  GstFlowReturn flow = GST_FLOW_OK;
-  if (!guarded(self, [&] { return priv->engine.drain(); })) flow = GST_FLOW_ERROR;
-  if (flow == GST_FLOW_OK) tell_of_solve(self);
-  while (flow == GST_FLOW_OK && priv->engine.ready()) {
-    GstBuffer* buffer = nullptr;
-    flow = next_output(self, &buffer);
-    if (flow == GST_FLOW_OK && buffer)
-      flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
-  }
-  if (flow == GST_FLOW_OK) return flow;
-  GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(priv->shells.size()),
-                   gst_flow_get_name(flow));
-  drop_frames(self);
-  return flow;
-}
-
-// True where `input` does not follow the frame before: time goes back, or leaves out more than a
-// camera loses. Notes where the next frame is expected.
-static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
-  GstClockTime* next = &self->priv->next_pts;
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
-  const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
-  const bool has_rate = GST_VIDEO_INFO_FPS_N(info) > 0;
-  GstClockTime frame = GST_BUFFER_DURATION(input);
-  if (has_rate)
-    frame = gst_util_uint64_scale(GST_SECOND, guint64(GST_VIDEO_INFO_FPS_D(info)),
-                                  guint64(GST_VIDEO_INFO_FPS_N(info)));
-  *next = GST_CLOCK_TIME_NONE;
-  // Frames of reverse playback come in reverse order.
-  if (!GST_CLOCK_TIME_IS_VALID(pts) || GST_BASE_TRANSFORM(self)->segment.rate < 0) return false;
-  if (!GST_CLOCK_TIME_IS_VALID(frame)) frame = 0;
-  *next = pts + frame;
-  if (!GST_CLOCK_TIME_IS_VALID(expected)) return false;
-  // Rounded timestamps may fall short by some.
-  if (pts + MAX(frame, 10 * GST_MSECOND) < expected) return true;
-  // Without a rate nobody knows how long a frame lasts.
-  return has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
-}
+// ---- Frames ----------------------------------------------------------------------------------
 
 static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* trans,
                                                              gboolean is_discont,
                                                              GstBuffer* input) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
-  Private* priv = self->priv;
-  follow_controllers(self, input);
-  GST_OBJECT_LOCK(self);
-  const bool reset = std::exchange(priv->reset_asked, false);
-  const bool freeze = priv->settings.freeze;
-  const int threads = priv->settings.engine.threads;
-  GST_OBJECT_UNLOCK(self);
-  // The base class keeps is_discont set until something was pushed, which can be a window later:
-  // the buffer's own flag says where time breaks.
-  const bool jump = time_jumps(self, input);
-  if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
-  if (GST_BUFFER_IS_DISCONT(input) || jump || reset) {
-    const GstFlowReturn flow = drain(self);
-    if (flow != GST_FLOW_OK) {
-      gst_buffer_unref(input);
-      return flow;
-    }
+  GstFlowReturn flow = qdmd::prepare_for(self, input);
+  if (flow != GST_FLOW_OK) {
+    gst_buffer_unref(input);
+    return flow;
   }
-  if (reset) drop_frames(self);
-
   // The parent renegotiates where that is due and leaves the buffer in queued_buf.
-  const GstFlowReturn flow =
-      GST_BASE_TRANSFORM_CLASS(parent_class)->submit_input_buffer(trans, is_discont, input);
-  if (flow != GST_FLOW_OK) return flow;
-  const BufferPtr buffer(trans->queued_buf);
-  trans->queued_buf = nullptr;
-  if (!buffer) return GST_FLOW_OK;
-  // The base class asks for frames until there is none, or until downstream refuses one (it has
-  // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
-  if (priv->engine.ready()) drop_frames(self);
-
-  BufferPtr shell(gst_buffer_new());
-  gst_buffer_copy_into(
-      shell.get(), buffer.get(),
-      GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
-      0, gsize(-1));
-  {
-    const MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->in_info, buffer.get(), GST_MAP_READ);
-    if (!frame) {
-      GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                        ("A buffer does not hold a frame of the negotiated caps."), (nullptr));
-      return GST_FLOW_ERROR;
-    }
-    const bool taken = guarded(self, [&] {
-      priv->shells.push_back(std::move(shell));
-      priv->engine.set_freeze(freeze);
-      priv->engine.set_threads(threads);
-      return priv->engine.push(priv->io.read(frame));
-    });
-    if (!taken) {
-      drop_frames(self);
-      return GST_FLOW_ERROR;
-    }
-  }
-  publish_report(self, 1, 0);
-  tell_of_solve(self);
-  return GST_FLOW_OK;
+  flow = GST_BASE_TRANSFORM_CLASS(parent_class)->submit_input_buffer(trans, is_discont, input);
+  if (flow != GST_FLOW_OK || !trans->queued_buf) return flow;
+  return qdmd::take_frame(self, qdmd::BufferPtr(std::exchange(trans->queued_buf, nullptr)));
 }
 
 static GstFlowReturn gst_qdmd_background_generate_output(GstBaseTransform* trans, GstBuffer** out) {
-  return next_output(GST_QDMD_BACKGROUND(trans), out);
+  return qdmd::next_output(GST_QDMD_BACKGROUND(trans), out);
 }
 
 // GstVideoFilter works in place on elements without this function; frames never come here, they go
@@ -449,20 +122,13 @@ static GstFlowReturn gst_qdmd_background_transform_frame(GstVideoFilter*, GstVid
 static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, GstVideoInfo* in,
                                              GstCaps*, GstVideoInfo*) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(filter);
-  Private* priv = self->priv;
+  qdmd::Frames* frames = self->frames;
 
   GST_OBJECT_LOCK(self);
-  const Settings settings = priv->settings;
+  const Settings settings = frames->settings;
   GST_OBJECT_UNLOCK(self);
 
-  priv->shells.clear();
-  priv->solves_told = 0;
-  priv->next_pts = GST_CLOCK_TIME_NONE;
-  const bool configured = guarded(self, [&] {
-    return priv->engine.configure(settings.engine, GST_VIDEO_INFO_WIDTH(in),
-                                  GST_VIDEO_INFO_HEIGHT(in));
-  });
-  if (!configured) return FALSE;
+  if (!qdmd::configure(self, settings, *in)) return FALSE;
 
   const bool has_rate = GST_VIDEO_INFO_FPS_N(in) > 0 && GST_VIDEO_INFO_FPS_D(in) > 0;
   const guint64 rate_n = has_rate ? guint64(GST_VIDEO_INFO_FPS_N(in)) : kAssumedRate;
@@ -471,8 +137,8 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, G
       settings.engine.mode == qdmd::Mode::live ? 0 : guint64(settings.engine.window_size - 1);
   const GstClockTime latency = gst_util_uint64_scale(delay * GST_SECOND, rate_d, rate_n);
   GST_OBJECT_LOCK(self);
-  const bool changed = latency != priv->latency;
-  priv->latency = latency;
+  const bool changed = latency != frames->latency;
+  frames->latency = latency;
   GST_OBJECT_UNLOCK(self);
   GST_INFO_OBJECT(self, "windows of %d frames, latency %" GST_TIME_FORMAT,
                   settings.engine.window_size, GST_TIME_ARGS(latency));
@@ -491,23 +157,23 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
       // Frames that wait belong to the old caps; equal caps change nothing.
       if (!GST_VIDEO_FILTER(self)->negotiated || !gst_video_info_from_caps(&info, caps) ||
           !gst_video_info_is_equal(&info, &GST_VIDEO_FILTER(self)->in_info))
-        drain(self);
+        qdmd::drain(self);
       break;
     }
     case GST_EVENT_STREAM_START:
       // Another stream, another scene.
-      drain(self);
-      drop_frames(self);
+      qdmd::drain(self);
+      qdmd::drop_frames(self);
       break;
     case GST_EVENT_SEGMENT:
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_GAP:
     case GST_EVENT_EOS:
       // The flow of these frames is not the event's: EOS goes on whatever they met.
-      drain(self);
+      qdmd::drain(self);
       break;
     case GST_EVENT_FLUSH_STOP:
-      drop_frames(self);
+      qdmd::drop_frames(self);
       break;
     default:
       break;
@@ -526,7 +192,7 @@ static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirecti
   GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
   gst_query_parse_latency(query, &live, &min, &max);
   GST_OBJECT_LOCK(self);
-  const GstClockTime own = self->priv->latency;
+  const GstClockTime own = self->frames->latency;
   GST_OBJECT_UNLOCK(self);
   min += own;
   if (GST_CLOCK_TIME_IS_VALID(max)) max += own;
@@ -548,38 +214,38 @@ static gboolean gst_qdmd_background_transform_meta(GstBaseTransform*, GstBuffer*
 
 static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
-  Private* priv = self->priv;
+  qdmd::Frames* frames = self->frames;
   GST_OBJECT_LOCK(self);
-  priv->counters = {};
-  priv->report = qdmd::SolveReport();
-  const SamplePtr old = std::move(priv->background);
+  frames->counters = {};
+  frames->report = qdmd::SolveReport();
+  const qdmd::SamplePtr old = std::move(frames->background);
   GST_OBJECT_UNLOCK(self);
   return TRUE;
 }
 
 static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
-  drop_frames(self);
-  self->priv->engine.close();
+  qdmd::drop_frames(self);
+  self->frames->engine.close();
   return TRUE;
 }
 
 // ---- Class --------------------------------------------------------------------------------------
 
 static void gst_qdmd_background_finalize(GObject* object) {
-  delete GST_QDMD_BACKGROUND(object)->priv;
+  delete GST_QDMD_BACKGROUND(object)->frames;
   G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_qdmd_background_init(GstQdmdBackground* self) {
-  self->priv = new Private();
+  self->frames = new qdmd::Frames();
   // A decomposition in time needs every frame.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 
 static void gst_qdmd_background_reset(GstQdmdBackground* self) {
   GST_OBJECT_LOCK(self);
-  self->priv->reset_asked = true;
+  self->frames->reset_asked = true;
   GST_OBJECT_UNLOCK(self);
 }
 

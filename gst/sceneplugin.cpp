@@ -1,4 +1,4 @@
-// Registers the scene source, in a plugin of its own: qdmdbackground's users need no OpenCV.
+// Registers the scene source, in a plugin of its own: qdmdbackground does without its libraries.
 #include <gst/gst.h>
 
 #include "gst/gstqdmdscenesrc.h"

@@ -2,7 +2,7 @@
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
-#   tests/install-dependencies.sh GROUP...      groups: build, test, demo, docs
+#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -10,10 +10,12 @@ build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -ugly and -x what
 # the documentation's pipelines and the demo encode and write text with, -opencv the element that
 # tests/bench compares with; gi runs the examples in Python.
-test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 clang-format
-  libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev gstreamer1.0-tools
-  gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
+test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 valgrind
+  clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
+  gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-plugins-ugly gstreamer1.0-x gstreamer1.0-opencv)
+# What gst/debian/control asks for beyond build; tests make a package, too.
+package=(debhelper dpkg-dev libopencv-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
 demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x)
@@ -25,9 +27,10 @@ for group in "$@"; do
   case "$group" in
     build) wanted+=("${build[@]}") ;;
     test) wanted+=("${test[@]}") ;;
+    package) wanted+=("${package[@]}") ;;
     demo) wanted+=("${demo[@]}") ;;
     docs) wanted+=("${docs[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, demo, docs)" >&2; exit 2 ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs)" >&2; exit 2 ;;
   esac
 done
 

@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, checks the formatting and runs every test.
+#
+#   QDMD_TEST_PACKAGE=1   compiles the Debian packages from their source, too: minutes more
+#   QDMD_TEST_INSTALL=1   as root: installs the packages on this machine and removes them again
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-tests/install-dependencies.sh build test
+tests/install-dependencies.sh build test package
 
 # Adds up a meson test log: GoogleTest's own cases are counted, not programs.
 count_results() {

@@ -263,5 +263,77 @@ TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
   }
 }
 
+// ---- The next frame's foreground, the newest background ----
+
+TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
+  std::mt19937 rng(130);
+  const Clip clip = moving_box_clip(700, 12, 40, rng);
+  for (Method method : {Method::qdmd, Method::robust})
+    for (double fixed : {0.0, 30.0}) {
+      auto options = window_of(12);
+      options.dmd.method = method;
+      options.foreground_threshold = fixed;
+      const Outputs out(clip, options);
+      Strip strip(clip.pixels, options);
+      for (const auto& frame : clip.frames) ASSERT_TRUE(strip.push(frame).ok());
+      for (size_t t = 0; t < clip.size(); ++t) {
+        std::vector<uint8_t> mask(clip.pixels), residual(clip.pixels);
+        strip.engine.foreground(mask.data(), residual.data());
+        for (size_t p = 0; p < clip.pixels; ++p) {
+          double squared = 0;
+          for (size_t c = 0; c < 3; ++c)
+            squared += std::pow(out.foreground[t][c * clip.pixels + p], 2);
+          ASSERT_EQ(mask[p], out.mask[t][p]);
+          ASSERT_EQ(residual[p], static_cast<int>(std::min(255.0, std::sqrt(squared))));
+        }
+        Picture picture(static_cast<int>(clip.pixels), 1);
+        strip.engine.pop(Output::mask, picture.out());
+      }
+    }
+}
+
+TEST(EngineOutput, WriteBackgroundIsThatOfTheNewestFrame) {
+  std::mt19937 rng(131);
+  const Clip clip = moving_box_clip(300, 12, 40, rng);
+  for (Mode mode : {Mode::batch, Mode::live}) {
+    auto options = window_of(12);
+    options.mode = mode;
+    const int width = static_cast<int>(clip.pixels);
+    Engine engine;
+    Picture newest(width, 1), last(width, 1);
+    EXPECT_FALSE(engine.write_background(newest.out()));
+    ASSERT_TRUE(engine.configure(options, width, 1).ok());
+    EXPECT_FALSE(engine.write_background(newest.out()));
+    for (const auto& frame : clip.frames) {
+      Picture picture(width, 1);
+      picture.fill(frame);
+      ASSERT_TRUE(engine.push(picture.in()).ok());
+      // Batch: the window is full now, and its last frame is the newest.
+      const bool there = engine.write_background(newest.out());
+      EXPECT_EQ(there, engine.solves() > 0);
+      while (engine.ready()) engine.pop(Output::background, last.out());
+    }
+    EXPECT_EQ(newest.planes(), last.planes());
+    engine.flush();
+    EXPECT_FALSE(engine.write_background(newest.out()));
+  }
+}
+
+TEST(EngineOutput, ThreadsChangeNothingWhileFramesCome) {
+  std::mt19937 rng(132);
+  const Clip clip = moving_box_clip(3000, 60, 40, rng);
+  for (Mode mode : {Mode::batch, Mode::live}) {
+    auto options = window_of(12);
+    options.mode = mode;
+    Strip steady(clip.pixels, options), changing(clip.pixels, options);
+    for (size_t t = 0; t < clip.size(); ++t) {
+      changing.engine.set_threads(static_cast<int>(t % 5));
+      ASSERT_TRUE(steady.push(clip.frames[t]).ok());
+      ASSERT_TRUE(changing.push(clip.frames[t]).ok());
+      ASSERT_EQ(steady.pop_all(Output::background), changing.pop_all(Output::background)) << t;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -112,5 +112,21 @@ TEST(Pool, WithoutMoreThreadsTheCallerDoesAll) {
   pthread_attr_destroy(&before);
 }
 
+TEST(Pool, ChangesItsSize) {
+  Pool pool(2);
+  for (int threads : {4, 1, 3, 3, 0, 2}) {
+    pool.resize(threads);
+    EXPECT_EQ(pool.threads(), static_cast<size_t>(std::max(threads, 1)));
+    for (size_t parts : {1, 5, 300}) {
+      std::vector<int> done(parts);
+      pool.run(parts, [&](size_t part, size_t worker) {
+        ASSERT_LT(worker, pool.threads());
+        ++done[part];
+      });
+      EXPECT_EQ(done, std::vector<int>(parts, 1)) << threads << " threads";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -238,9 +238,9 @@ TEST(SceneJitter, ThePictureIsShiftedByTheShift) {
       for (int y = kBorder; y < kHeight - kBorder; ++y)
         for (int x = kBorder; x < kWidth - kBorder; ++x)
           for (int c = 0; c < 3; ++c) {
-            const auto at = [&](int ox, int oy) {
+            const auto at = [&, source = from](int ox, int oy) {
               return static_cast<double>(
-                  (*from)[static_cast<size_t>(((y + dy + oy) * kWidth + x + dx + ox) * 3 + c)]);
+                  (*source)[static_cast<size_t>(((y + dy + oy) * kWidth + x + dx + ox) * 3 + c)]);
             };
             const double a = at(0, 0), b = at(1, 0), d = at(0, 1), e = at(1, 1);
             const double expected = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * e);

@@ -149,5 +149,16 @@ TEST(SideThread, KeepsNothingOfWorkThatIsOver) {
   EXPECT_EQ(captured.use_count(), 1);
 }
 
+TEST(SideThread, IsSwitchedOnAndOff) {
+  SideThread side(false);
+  for (bool active : {true, true, false, false, true}) {
+    side.set_active(active);
+    std::thread::id worker;
+    side.start([&] { worker = std::this_thread::get_id(); });
+    side.finish();
+    EXPECT_EQ(active, worker != std::this_thread::get_id());
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

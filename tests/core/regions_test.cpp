@@ -1,0 +1,113 @@
+// Boxes around foreground: joined, merged, counted, and left out where they are small.
+#include "core/regions/regions.h"
+
+#include <gtest/gtest.h>
+
+namespace qdmd::test {
+namespace {
+
+struct Mask {
+  int width, height;
+  std::vector<uint8_t> white, residual;
+
+  Mask(int width_, int height_)
+      : width(width_),
+        height(height_),
+        white(static_cast<size_t>(width * height)),
+        residual(white.size()) {}
+  void box(int x, int y, int w, int h, uint8_t level) {
+    for (int yy = y; yy < y + h; ++yy)
+      for (int xx = x; xx < x + w; ++xx) {
+        white[static_cast<size_t>(yy * width + xx)] = 255;
+        residual[static_cast<size_t>(yy * width + xx)] = level;
+      }
+  }
+  std::vector<Region> regions(int least_area = 0) const {
+    return find_regions(white.data(), residual.data(), width, height, least_area);
+  }
+};
+
+void expect_box(const Region& region, int x, int y, int w, int h) {
+  EXPECT_EQ(region.x, x);
+  EXPECT_EQ(region.y, y);
+  EXPECT_EQ(region.width, w);
+  EXPECT_EQ(region.height, h);
+}
+
+TEST(Regions, AreTightBoxesTheLargestFirst) {
+  Mask mask(320, 240);
+  mask.box(10, 20, 10, 30, 60);
+  mask.box(200, 100, 40, 50, 90);
+  const auto regions = mask.regions();
+  ASSERT_EQ(regions.size(), 2u);
+  expect_box(regions[0], 200, 100, 40, 50);
+  EXPECT_EQ(regions[0].area, 2000);
+  EXPECT_DOUBLE_EQ(regions[0].mean_residual, 90);
+  expect_box(regions[1], 10, 20, 10, 30);
+}
+
+// Feet that a threshold cut off belong to their legs.
+TEST(Regions, PartsThatAreNearAreOne) {
+  Mask mask(320, 240);
+  mask.box(50, 50, 20, 30, 100);
+  mask.box(50, 83, 20, 10, 40);
+  const auto regions = mask.regions();
+  ASSERT_EQ(regions.size(), 1u);
+  expect_box(regions[0], 50, 50, 20, 43);
+  EXPECT_EQ(regions[0].area, 800);
+  EXPECT_DOUBLE_EQ(regions[0].mean_residual, (600 * 100 + 200 * 40) / 800.0);
+  // Farther away, they are two.
+  mask.box(50, 110, 20, 10, 40);
+  EXPECT_EQ(mask.regions().size(), 2u);
+}
+
+// A frame around something else: boxes overlap though nothing touches. What has grown by it
+// overlaps a third.
+TEST(Regions, OverlappingBoxesAreMerged) {
+  Mask mask(320, 240);
+  mask.box(100, 100, 60, 4, 80);
+  mask.box(100, 100, 4, 60, 80);
+  mask.box(130, 130, 12, 12, 50);
+  mask.box(150, 155, 40, 12, 50);
+  mask.box(250, 30, 20, 20, 70);
+  const auto regions = mask.regions();
+  ASSERT_EQ(regions.size(), 2u);
+  expect_box(regions[0], 100, 100, 90, 67);
+  EXPECT_EQ(regions[0].area, 60 * 4 + 56 * 4 + 144 + 480);
+  expect_box(regions[1], 250, 30, 20, 20);
+}
+
+TEST(Regions, SmallOnesAreLeftOut) {
+  Mask mask(320, 240);
+  mask.box(10, 10, 5, 5, 60);
+  mask.box(100, 100, 8, 8, 60);
+  // 1/2000 of the picture are 38 pixels.
+  EXPECT_EQ(mask.regions().size(), 1u);
+  EXPECT_EQ(mask.regions(25).size(), 2u);
+  EXPECT_EQ(mask.regions(26).size(), 1u);
+  EXPECT_EQ(mask.regions(65).size(), 0u);
+}
+
+TEST(Regions, OfEverythingNothingAndOnePixel) {
+  EXPECT_TRUE(Mask(320, 240).regions().empty());
+  EXPECT_TRUE(Mask(320, 240).regions(1).empty());
+  Mask all(64, 48);
+  all.box(0, 0, 64, 48, 255);
+  ASSERT_EQ(all.regions().size(), 1u);
+  expect_box(all.regions()[0], 0, 0, 64, 48);
+  Mask pixel(1, 1);
+  EXPECT_TRUE(pixel.regions(1).empty());
+  pixel.box(0, 0, 1, 1, 9);
+  ASSERT_EQ(pixel.regions(1).size(), 1u);
+  expect_box(pixel.regions(1)[0], 0, 0, 1, 1);
+}
+
+TEST(Regions, AreNotCountless) {
+  Mask mask(1280, 960);
+  for (int y = 4; y < 940; y += 40)
+    for (int x = 4; x < 1240; x += 40) mask.box(x, y, 3, 3, 50);
+  EXPECT_EQ(mask.regions(1).size(), kMostRegions);
+}
+
+}  // namespace
+}  // namespace qdmd::test

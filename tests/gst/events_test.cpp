@@ -1,0 +1,354 @@
+// What becomes of a window when an event or a query arrives in its middle: one test a row.
+#include <gst/video/gstvideometa.h>
+
+#include "tests/gst/element_test.h"
+
+namespace qdmd::test {
+namespace {
+
+constexpr int kWindow = 8;
+
+// A stream that has just received three frames of a window.
+class HalfAWindow : public testing::Test {
+ protected:
+  HalfAWindow() : stream_("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24) {
+    stream_.push_many(0, 3);
+    EXPECT_TRUE(stream_.take_all().empty());
+  }
+  void send(GstEvent* event) { EXPECT_TRUE(gst_harness_push_event(stream_.harness(), event)); }
+  // Frames `first` .. end - 1 came out and nothing else.
+  void expect_frames(int first, int end) {
+    const auto out = stream_.take_all();
+    ASSERT_EQ(static_cast<size_t>(end - first), out.size());
+    for (int t = first; t < end; ++t)
+      EXPECT_EQ(static_cast<GstClockTime>(t) * kFrame,
+                GST_BUFFER_PTS(out[static_cast<size_t>(t - first)].get()));
+  }
+  // A new window begins with frame `first`: it is full after kWindow frames, not before.
+  void expect_new_window(int first) {
+    stream_.push_many(first, kWindow - 1);
+    expect_frames(first, first);
+    stream_.push_many(first + kWindow - 1, 1);
+    expect_frames(first, first + kWindow);
+  }
+  static GstSegment segment_from(GstClockTime start, double rate = 1) {
+    GstSegment segment;
+    gst_segment_init(&segment, GST_FORMAT_TIME);
+    segment.rate = rate;
+    segment.start = segment.time = start;
+    segment.stop = start + 1000 * GST_SECOND;
+    return segment;
+  }
+
+  Stream stream_;
+};
+
+TEST_F(HalfAWindow, StreamStartSendsItAndForgetsTheBackground) {
+  send(gst_event_new_stream_start("another"));
+  expect_frames(0, 3);
+  GstCaps* caps = gst_video_info_to_caps(&stream_.info());
+  send(gst_event_new_caps(caps));
+  gst_caps_unref(caps);
+  const GstSegment segment = segment_from(0);
+  send(gst_event_new_segment(&segment));
+  expect_new_window(3);
+}
+
+TEST_F(HalfAWindow, SegmentSendsIt) {
+  const GstSegment segment = segment_from(10 * GST_SECOND);
+  send(gst_event_new_segment(&segment));
+  expect_frames(0, 3);
+  expect_new_window(250);
+}
+
+TEST_F(HalfAWindow, SegmentDoneSendsIt) {
+  send(gst_event_new_segment_done(GST_FORMAT_TIME, 3 * kFrame));
+  expect_frames(0, 3);
+}
+
+TEST_F(HalfAWindow, EosSendsIt) {
+  ASSERT_TRUE(stream_.eos());
+  expect_frames(0, 3);
+}
+
+TEST_F(HalfAWindow, GapSendsItFirst) {
+  send(gst_event_new_gap(3 * kFrame, kFrame));
+  expect_frames(0, 3);
+  expect_new_window(4);
+}
+
+TEST_F(HalfAWindow, CapsOfAnotherSizeSendItFirst) {
+  stream_.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16);
+  const auto out = stream_.take_all();
+  ASSERT_EQ(3u, out.size());
+  for (const auto& buffer : out) EXPECT_EQ(40u * 24 * 3, gst_buffer_get_size(buffer.get()));
+}
+
+TEST_F(HalfAWindow, DiscontSendsItFirst) {
+  auto buffer = stream_.make_frame(3, paint_mover);
+  GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+  expect_frames(0, 3);
+}
+
+TEST_F(HalfAWindow, AJumpForwardsInTimeSendsItFirst) {
+  expect_frames(0, 0);
+  stream_.push_many(3 + 25 * 2, 1);
+  expect_frames(0, 3);
+  stream_.push_many(54, kWindow - 1);
+  expect_frames(53, 53 + kWindow);
+}
+
+TEST_F(HalfAWindow, AJumpBackInTimeSendsItFirst) {
+  stream_.push_many(0, 1);
+  expect_frames(0, 3);
+}
+
+TEST_F(HalfAWindow, FramesThatACameraLostLeaveItAsItIs) {
+  stream_.push_many(3 + 20, kWindow - 3);
+  EXPECT_EQ(static_cast<size_t>(kWindow), stream_.take_all().size());
+}
+
+TEST_F(HalfAWindow, TimestampsThatAreRoundedLeaveItAsItIs) {
+  for (int t = 3; t < kWindow; ++t) {
+    auto buffer = stream_.make_frame(t, paint_mover);
+    GST_BUFFER_PTS(buffer.get()) += t % 2 ? 9 * GST_MSECOND : 0;
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+  }
+  EXPECT_EQ(static_cast<size_t>(kWindow), stream_.take_all().size());
+}
+
+TEST_F(HalfAWindow, FramesWithoutTimestampsLeaveItAsItIs) {
+  for (int t = 3; t < kWindow; ++t) {
+    auto buffer = stream_.make_frame(t, paint_mover);
+    GST_BUFFER_PTS(buffer.get()) = GST_CLOCK_TIME_NONE;
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+  }
+  const auto out = stream_.take_all();
+  ASSERT_EQ(static_cast<size_t>(kWindow), out.size());
+  EXPECT_EQ(2 * kFrame, GST_BUFFER_PTS(out[2].get()));
+  EXPECT_FALSE(GST_BUFFER_PTS_IS_VALID(out[3].get()));
+}
+
+TEST_F(HalfAWindow, FlushDropsIt) {
+  send(gst_event_new_flush_start());
+  send(gst_event_new_flush_stop(TRUE));
+  const GstSegment segment = segment_from(0);
+  send(gst_event_new_segment(&segment));
+  expect_new_window(3);
+}
+
+TEST_F(HalfAWindow, ReversePlaybackBeginsANewOne) {
+  const GstSegment segment = segment_from(0, -1);
+  send(gst_event_new_segment(&segment));
+  expect_frames(0, 3);
+  // Time runs back within it, which is no jump.
+  for (int t = 40; t > 40 - kWindow; --t) ASSERT_EQ(GST_FLOW_OK, stream_.push(t));
+  const auto out = stream_.take_all();
+  ASSERT_EQ(static_cast<size_t>(kWindow), out.size());
+  EXPECT_EQ(40 * kFrame, GST_BUFFER_PTS(out[0].get()));
+}
+
+TEST_F(HalfAWindow, AnotherPlaybackRateBeginsANewOne) {
+  const GstSegment segment = segment_from(0, 2);
+  send(gst_event_new_segment(&segment));
+  expect_frames(0, 3);
+  expect_new_window(3);
+}
+
+TEST_F(HalfAWindow, TagsAndCustomEventsPassAtOnce) {
+  while (GstEvent* event = gst_harness_try_pull_event(stream_.harness())) gst_event_unref(event);
+  send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "street", nullptr)));
+  send(gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("mine")));
+  expect_frames(0, 0);
+  for (GstEventType type : {GST_EVENT_TAG, GST_EVENT_CUSTOM_DOWNSTREAM}) {
+    GstEvent* event = gst_harness_try_pull_event(stream_.harness());
+    ASSERT_NE(nullptr, event);
+    EXPECT_EQ(type, GST_EVENT_TYPE(event));
+    gst_event_unref(event);
+  }
+}
+
+TEST_F(HalfAWindow, ReconfigureLeavesItAsItIs) {
+  gst_harness_push_upstream_event(stream_.harness(), gst_event_new_reconfigure());
+  stream_.push_many(3, kWindow - 3);
+  expect_frames(0, kWindow);
+}
+
+// Nothing of upstream's is held, so there is nothing to give back.
+TEST_F(HalfAWindow, DrainQueryIsAnswered) {
+  GstQuery* query = gst_query_new_drain();
+  GstPad* pad = gst_pad_get_peer(stream_.harness()->srcpad);
+  EXPECT_TRUE(gst_pad_query(pad, query));
+  gst_object_unref(pad);
+  gst_query_unref(query);
+  stream_.push_many(3, kWindow - 3);
+  expect_frames(0, kWindow);
+}
+
+TEST_F(HalfAWindow, AllocationQueryAsksForNoBuffers) {
+  GstCaps* caps = gst_video_info_to_caps(&stream_.info());
+  GstQuery* query = gst_query_new_allocation(caps, TRUE);
+  GstPad* pad = gst_pad_get_peer(stream_.harness()->srcpad);
+  EXPECT_TRUE(gst_pad_query(pad, query));
+  for (guint i = 0; i < gst_query_get_n_allocation_pools(query); ++i) {
+    guint min = 99;
+    gst_query_parse_nth_allocation_pool(query, i, nullptr, nullptr, &min, nullptr);
+    EXPECT_LE(min, 1u) << "a window must not need upstream's buffers";
+  }
+  EXPECT_TRUE(gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
+      << "padded strides are read";
+  EXPECT_FALSE(gst_query_find_allocation_meta(query, GST_VIDEO_CROP_META_API_TYPE, nullptr));
+  gst_object_unref(pad);
+  gst_query_unref(query);
+  gst_caps_unref(caps);
+}
+
+TEST(Pools, OfTwoBuffersUpstreamDoNotStall) {
+  Stream stream("qdmdbackground window-size=100", GST_VIDEO_FORMAT_RGB, 40, 24);
+  GstBufferPool* pool = gst_buffer_pool_new();
+  GstStructure* config = gst_buffer_pool_get_config(pool);
+  GstCaps* caps = gst_video_info_to_caps(&stream.info());
+  gst_buffer_pool_config_set_params(config, caps, static_cast<guint>(stream.info().size), 2, 2);
+  gst_caps_unref(caps);
+  ASSERT_TRUE(gst_buffer_pool_set_config(pool, config));
+  ASSERT_TRUE(gst_buffer_pool_set_active(pool, TRUE));
+  size_t out = 0;
+  for (int t = 0; t < 250; ++t) {
+    GstBuffer* buffer = nullptr;
+    GstBufferPoolAcquireParams params = {};
+    params.flags = GST_BUFFER_POOL_ACQUIRE_FLAG_DONTWAIT;
+    ASSERT_EQ(GST_FLOW_OK, gst_buffer_pool_acquire_buffer(pool, &buffer, &params)) << t;
+    stream.stamp(buffer, t);
+    stream.fill(buffer, t, paint_mover);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer));
+    out += stream.take_all().size();
+  }
+  ASSERT_TRUE(stream.eos());
+  out += stream.take_all().size();
+  EXPECT_EQ(250u, out);
+  gst_buffer_pool_set_active(pool, FALSE);
+  gst_object_unref(pool);
+}
+
+// ---- Latency while running ----
+
+int latency_messages(GstBus* bus) {
+  int count = 0;
+  while (GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_LATENCY)) {
+    ++count;
+    gst_message_unref(message);
+  }
+  return count;
+}
+
+TEST(LatencyMessage, IsPostedOnceForEachChange) {
+  Stream stream("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24);
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  GstBus* bus = gst_bus_new();
+  gst_element_set_bus(element, bus);
+  stream.push_many(0, 8);
+  EXPECT_EQ(0, latency_messages(bus)) << "it was posted with the first caps";
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16);
+  stream.push_many(8, 8);
+  EXPECT_EQ(0, latency_messages(bus)) << "the rate is the same";
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16, 50);
+  EXPECT_EQ(1, latency_messages(bus));
+  EXPECT_EQ(7 * GST_SECOND / 50, gst_harness_query_latency(stream.harness()));
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16, 0);
+  EXPECT_EQ(1, latency_messages(bus));
+  EXPECT_EQ(7 * GST_SECOND / 25, gst_harness_query_latency(stream.harness()));
+  gst_element_set_bus(element, nullptr);
+  gst_object_unref(bus);
+  gst_object_unref(element);
+}
+
+TEST(LatencyMessage, OfAnotherWindowSizeComesWithTheNextStart) {
+  GstElement* pipeline = gst_parse_launch(
+      "videotestsrc num-buffers=20 ! video/x-raw,format=RGB,width=16,height=16,framerate=25/1 ! "
+      "qdmdbackground name=q window-size=5 ! fakesink",
+      nullptr);
+  GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline), "q");
+  for (guint size : {5u, 9u}) {
+    g_object_set(element, "window-size", size, nullptr);
+    gst_element_set_state(pipeline, GST_STATE_PAUSED);
+    gst_element_get_state(pipeline, nullptr, nullptr, 10 * GST_SECOND);
+    GstPad* pad = gst_element_get_static_pad(element, "src");
+    GstQuery* query = gst_query_new_latency();
+    EXPECT_TRUE(gst_pad_query(pad, query));
+    GstClockTime min = 0;
+    gst_query_parse_latency(query, nullptr, &min, nullptr);
+    EXPECT_EQ((size - 1 + 1) * kFrame, min) << "the source has a frame's latency of its own";
+    gst_query_unref(query);
+    gst_object_unref(pad);
+    gst_element_set_state(pipeline, GST_STATE_READY);
+  }
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(element);
+  gst_object_unref(pipeline);
+}
+
+// ---- Whole pipelines ----
+
+// Runs to the end; the pipeline is in `use`'s hands before it stops.
+void run(const std::string& text, const std::function<void(GstBin*)>& use = nullptr) {
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(text.c_str(), &error);
+  ASSERT_EQ(nullptr, error) << error->message;
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstBus* bus = gst_element_get_bus(pipeline);
+  GstMessage* end = gst_bus_timed_pop_filtered(bus, 60 * GST_SECOND,
+                                               GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  ASSERT_NE(nullptr, end) << "no end after a minute";
+  EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(end));
+  gst_message_unref(end);
+  if (use) use(GST_BIN(pipeline));
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(pipeline);
+}
+
+// The leaks tracer, under which these tests run, counts at the end.
+TEST(Pipelines, NinetyFramesLeaveNothingAlive) {
+  run("videotestsrc num-buffers=90 ! qdmdbackground window-size=30 ! fakesink");
+}
+
+void expect_none_dropped(GstBin* pipeline, const char* name, guint64 frames) {
+  GstElement* sink = gst_bin_get_by_name(pipeline, name);
+  GstStructure* stats = nullptr;
+  guint64 rendered = 0, dropped = 0;
+  g_object_get(sink, "stats", &stats, nullptr);
+  gst_structure_get(stats, "rendered", G_TYPE_UINT64, &rendered, "dropped", G_TYPE_UINT64, &dropped,
+                    nullptr);
+  EXPECT_EQ(frames, rendered) << name;
+  EXPECT_EQ(0u, dropped) << name;
+  gst_structure_free(stats);
+  gst_object_unref(sink);
+}
+
+// Half a second of latency in one branch; sinks drop what is later than 0.2 seconds. The other
+// branches' queues hold what that branch delays.
+TEST(Pipelines, ALiveTeeWithAudioBesideKeepsTime) {
+  run("videotestsrc is-live=true num-buffers=50 ! "
+      "video/x-raw,format=RGB,width=64,height=48,framerate=25/1 ! tee name=t ! queue ! "
+      "qdmdbackground window-size=13 ! videoconvert ! "
+      "fakesink name=separated sync=true max-lateness=200000000 "
+      "t. ! queue max-size-time=1000000000 max-size-buffers=0 max-size-bytes=0 ! "
+      "fakesink name=original sync=true max-lateness=200000000 "
+      "audiotestsrc is-live=true num-buffers=86 ! "
+      "queue max-size-time=1000000000 max-size-buffers=0 max-size-bytes=0 ! "
+      "fakesink name=audio sync=true max-lateness=200000000",
+      [](GstBin* pipeline) {
+        expect_none_dropped(pipeline, "separated", 50);
+        expect_none_dropped(pipeline, "original", 50);
+        expect_none_dropped(pipeline, "audio", 86);
+      });
+}
+
+TEST(Pipelines, VeryLargeFramesInAShortWindow) {
+  run("videotestsrc num-buffers=3 ! video/x-raw,format=RGB,width=8192,height=4320 ! "
+      "qdmdbackground window-size=2 ! fakesink");
+}
+
+}  // namespace
+}  // namespace qdmd::test

@@ -1,0 +1,444 @@
+// Messages, the background sample, regions, formats, and properties that change while playing.
+#include <gst/controller/controller.h>
+#include <gst/video/gstvideometa.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/gst/element_test.h"
+
+namespace qdmd::test {
+namespace {
+
+// An element of a stream with a bus of its own.
+class Element {
+ public:
+  explicit Element(Stream& stream)
+      : element_(gst_harness_find_element(stream.harness(), "qdmdbackground")),
+        bus_(gst_bus_new()) {
+    gst_element_set_bus(element_, bus_);
+  }
+  ~Element() {
+    gst_element_set_bus(element_, nullptr);
+    gst_object_unref(bus_);
+    gst_object_unref(element_);
+  }
+  Element(const Element&) = delete;
+  Element& operator=(const Element&) = delete;
+
+  GstElement* get() const { return element_; }
+  template <typename... Values>
+  void set(const char* name, Values... values) {
+    g_object_set(element_, name, values..., nullptr);
+  }
+  // The solves' messages since the last call.
+  std::vector<GstMessage*> messages() {
+    std::vector<GstMessage*> all;
+    while (GstMessage* message = gst_bus_pop_filtered(bus_, GST_MESSAGE_ELEMENT))
+      all.push_back(message);
+    return all;
+  }
+  GstSample* background() const {
+    GstSample* sample = nullptr;
+    g_object_get(element_, "background", &sample, nullptr);
+    return sample;
+  }
+
+ private:
+  GstElement* element_;
+  GstBus* bus_;
+};
+
+// ---- Messages ----
+
+TEST(Messages, OneForEachSolveWithTheFramesThatComeWithIt) {
+  Stream stream("qdmdbackground window-size=8 post-messages=true", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  stream.push_many(0, 19);
+  ASSERT_TRUE(stream.eos());
+  const auto messages = element.messages();
+  ASSERT_EQ(3u, messages.size());
+  const GstClockTime begins[] = {0, 8 * kFrame, 16 * kFrame};
+  const GstClockTime lasts[] = {8 * kFrame, 8 * kFrame, 3 * kFrame};
+  for (size_t k = 0; k < 3; ++k) {
+    const GstStructure* s = gst_message_get_structure(messages[k]);
+    ASSERT_TRUE(gst_structure_has_name(s, "qdmdbackground"));
+    EXPECT_EQ(GST_OBJECT(element.get()), GST_MESSAGE_SRC(messages[k]));
+    guint64 timestamp = 0, stream_time = 0, running_time = 0, duration = 0;
+    guint frames = 0, rank = 0;
+    double real = 0, imaginary = 1, omega = -1, residual = -1, ratio = -1, time = -1;
+    ASSERT_TRUE(gst_structure_get(
+        s, "timestamp", G_TYPE_UINT64, &timestamp, "stream-time", G_TYPE_UINT64, &stream_time,
+        "running-time", G_TYPE_UINT64, &running_time, "duration", G_TYPE_UINT64, &duration,
+        "window-frames", G_TYPE_UINT, &frames, "rank", G_TYPE_UINT, &rank, "lambda-real",
+        G_TYPE_DOUBLE, &real, "lambda-imaginary", G_TYPE_DOUBLE, &imaginary, "omega", G_TYPE_DOUBLE,
+        &omega, "residual", G_TYPE_DOUBLE, &residual, "foreground-ratio", G_TYPE_DOUBLE, &ratio,
+        "solve-time", G_TYPE_DOUBLE, &time, nullptr));
+    EXPECT_EQ(begins[k], timestamp);
+    EXPECT_EQ(begins[k], stream_time);
+    EXPECT_EQ(begins[k], running_time);
+    EXPECT_EQ(lasts[k], duration);
+    EXPECT_EQ(8u, frames) << "a remainder is solved on the last window-size frames";
+    EXPECT_EQ(1u, rank);
+    EXPECT_NEAR(1, real, 0.05);
+    EXPECT_NEAR(0, imaginary, 0.05);
+    EXPECT_GE(omega, 0);
+    EXPECT_GE(residual, 0);
+    EXPECT_GT(ratio, 0);
+    EXPECT_LT(ratio, 0.2);
+    EXPECT_GT(time, 0);
+    gst_message_unref(messages[k]);
+  }
+}
+
+TEST(Messages, NoneWithoutBeingAskedAndAnyTime) {
+  Stream stream("qdmdbackground window-size=4", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  stream.push_many(0, 4);
+  EXPECT_TRUE(element.messages().empty());
+  element.set("post-messages", TRUE);
+  stream.push_many(4, 4);
+  const auto messages = element.messages();
+  ASSERT_EQ(1u, messages.size());
+  gst_message_unref(messages[0]);
+  element.set("post-messages", FALSE);
+  stream.push_many(8, 4);
+  EXPECT_TRUE(element.messages().empty());
+}
+
+TEST(Messages, TimesFollowTheSegment) {
+  Stream stream("qdmdbackground window-size=4 post-messages=true", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = 10 * GST_SECOND;
+  segment.time = 3 * GST_SECOND;
+  segment.base = 5 * GST_SECOND;
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_segment(&segment)));
+  stream.push_many(250, 4);
+  const auto messages = element.messages();
+  ASSERT_EQ(1u, messages.size());
+  guint64 stream_time = 0, running_time = 0;
+  gst_structure_get(gst_message_get_structure(messages[0]), "stream-time", G_TYPE_UINT64,
+                    &stream_time, "running-time", G_TYPE_UINT64, &running_time, nullptr);
+  EXPECT_EQ(3 * GST_SECOND, stream_time);
+  EXPECT_EQ(5 * GST_SECOND, running_time);
+  gst_message_unref(messages[0]);
+}
+
+// ---- The background as a sample ----
+
+TEST(BackgroundSample, IsTheNewestPicture) {
+  for (GstVideoFormat format : {GST_VIDEO_FORMAT_RGB, GST_VIDEO_FORMAT_BGRA}) {
+    Stream stream("qdmdbackground window-size=16", format, 40, 24);
+    Element element(stream);
+    EXPECT_EQ(nullptr, element.background());
+    stream.push_many(0, 15);
+    EXPECT_EQ(nullptr, element.background());
+    stream.push_many(15, 17);
+    GstSample* sample = element.background();
+    ASSERT_NE(nullptr, sample);
+    GstVideoInfo info;
+    ASSERT_TRUE(gst_video_info_from_caps(&info, gst_sample_get_caps(sample)));
+    EXPECT_TRUE(gst_video_info_is_equal(&info, &stream.info()));
+    GstBuffer* picture = gst_sample_get_buffer(sample);
+    EXPECT_EQ(16 * kFrame, GST_BUFFER_PTS(picture));
+    EXPECT_EQ(16 * kFrame, GST_BUFFER_DURATION(picture));
+    stream.each_pixel(picture, [](int x, int y, const uint8_t* p, int alpha) {
+      uint8_t rgb[3];
+      paint_still(0, x, y, rgb);
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(rgb[c], p[c], 1) << x << " " << y;
+      ASSERT_TRUE(alpha == -1 || alpha == 255);
+    });
+    gst_sample_unref(sample);
+  }
+}
+
+TEST(BackgroundSample, IsThereInLiveAndGoneAfterAStop) {
+  Stream stream("qdmdbackground mode=live window-size=16", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  stream.push_many(0, 40);
+  GstSample* sample = element.background();
+  ASSERT_NE(nullptr, sample);
+  gst_sample_unref(sample);
+  gst_element_set_state(element.get(), GST_STATE_READY);
+  gst_element_set_state(element.get(), GST_STATE_PLAYING);
+  EXPECT_EQ(nullptr, element.background());
+}
+
+// Any thread may read it while frames stream.
+TEST(BackgroundSample, IsReadFromOtherThreads) {
+  Stream stream("qdmdbackground window-size=4", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  std::atomic<bool> stop = false;
+  std::thread reader([&] {
+    while (!stop) {
+      if (GstSample* sample = element.background()) gst_sample_unref(sample);
+      GstStructure* stats = nullptr;
+      g_object_get(element.get(), "stats", &stats, nullptr);
+      gst_structure_free(stats);
+    }
+  });
+  for (int t = 0; t < 400; ++t) {
+    stream.push_many(t, 1);
+    stream.take_all();
+  }
+  stop = true;
+  reader.join();
+}
+
+// ---- Regions ----
+
+std::vector<GstVideoRegionOfInterestMeta*> regions_of(GstBuffer* buffer, const char* type) {
+  std::vector<GstVideoRegionOfInterestMeta*> all;
+  gpointer state = nullptr;
+  while (auto* meta = gst_buffer_iterate_meta_filtered(
+             buffer, &state, GST_VIDEO_REGION_OF_INTEREST_META_API_TYPE)) {
+    auto* region = reinterpret_cast<GstVideoRegionOfInterestMeta*>(meta);
+    if (region->roi_type == g_quark_from_string(type)) all.push_back(region);
+  }
+  return all;
+}
+
+// Two squares on a still ground, far from each other; a spot of one pixel.
+void paint_two(int t, int x, int y, uint8_t rgb[3]) {
+  paint_still(t, x, y, rgb);
+  const auto white = [&] { rgb[0] = rgb[1] = rgb[2] = 250; };
+  const int left = 2 * t % 60;
+  if (x >= left && x < left + 12 && y >= 10 && y < 22) white();
+  if (x >= 90 - left && x < 96 - left && y >= 60 && y < 66) white();
+  if (x == t && y == 45) white();
+}
+
+TEST(Regions, AreTheBoxesOfWhatMoves) {
+  Stream stream("qdmdbackground window-size=30 regions=true", GST_VIDEO_FORMAT_RGB, 120, 90);
+  for (int t = 0; t < 30; ++t) {
+    auto buffer = stream.make_frame(t, paint_two);
+    gst_buffer_add_video_region_of_interest_meta(buffer.get(), "face", 1, 2, 3, 4);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  }
+  const auto out = stream.take_all();
+  ASSERT_EQ(30u, out.size());
+  for (int t = 0; t < 30; ++t) {
+    SCOPED_TRACE(t);
+    GstBuffer* buffer = out[static_cast<size_t>(t)].get();
+    EXPECT_EQ(1u, regions_of(buffer, "face").size()) << "upstream's stay";
+    const auto regions = regions_of(buffer, "foreground");
+    ASSERT_EQ(2u, regions.size()) << "one pixel is no region";
+    const guint left = static_cast<guint>(2 * t % 60);
+    EXPECT_EQ(left, regions[0]->x);
+    EXPECT_EQ(10u, regions[0]->y);
+    EXPECT_EQ(12u, regions[0]->w);
+    EXPECT_EQ(12u, regions[0]->h);
+    EXPECT_EQ(90 - left, regions[1]->x);
+    EXPECT_EQ(6u, regions[1]->w);
+    const GstStructure* more =
+        gst_video_region_of_interest_meta_get_param(regions[0], "foreground");
+    ASSERT_NE(nullptr, more);
+    guint area = 0;
+    double residual = 0;
+    ASSERT_TRUE(gst_structure_get(more, "area", G_TYPE_UINT, &area, "mean-residual", G_TYPE_DOUBLE,
+                                  &residual, nullptr));
+    EXPECT_EQ(144u, area);
+    // White is 110 to 200 levels from the ground in each channel.
+    EXPECT_GT(residual, 180);
+    EXPECT_LE(residual, 255);
+  }
+}
+
+TEST(Regions, NoneWithoutBeingAskedAndOnlyLargeOnes) {
+  Stream stream("qdmdbackground window-size=30", GST_VIDEO_FORMAT_RGB, 120, 90);
+  Element element(stream);
+  stream.push_many(0, 30, paint_two);
+  for (const auto& buffer : stream.take_all())
+    EXPECT_TRUE(regions_of(buffer.get(), "foreground").empty());
+  element.set("regions", TRUE, "regions-min-area", 100u);
+  stream.push_many(30, 30, paint_two);
+  for (const auto& buffer : stream.take_all())
+    EXPECT_EQ(1u, regions_of(buffer.get(), "foreground").size());
+}
+
+TEST(Regions, NoneWhereNothingMoves) {
+  Stream stream("qdmdbackground window-size=10 regions=true", GST_VIDEO_FORMAT_RGB, 33, 17);
+  stream.push_many(0, 10, paint_still);
+  for (const auto& buffer : stream.take_all())
+    EXPECT_TRUE(regions_of(buffer.get(), "foreground").empty());
+}
+
+// ---- Formats other than packed R, G, B ----
+
+// A grey ground that brightens from left to right, with a square that moves.
+int grey_at(int t, int x, int y) {
+  const int left = 3 * t % 40;
+  return x >= left && x < left + 8 && y >= 8 && y < 16 ? 230 : 60 + x;
+}
+
+class PlanarFormats : public testing::TestWithParam<std::tuple<const char*, int, int>> {};
+
+TEST_P(PlanarFormats, BackgroundAndMaskAreThoseOfTheScene) {
+  const auto [name, width, height] = GetParam();
+  const GstVideoFormat format = gst_video_format_from_string(name);
+  for (bool mask : {false, true}) {
+    Stream stream(
+        std::string("qdmdbackground window-size=40 output=") + (mask ? "mask" : "background"),
+        format, width, height);
+    const GstVideoInfo& info = stream.info();
+    const bool yuv = GST_VIDEO_INFO_IS_YUV(&info);
+    const auto each_sample = [&](GstBuffer* buffer, GstMapFlags flags, const auto& see) {
+      GstVideoFrame frame;
+      ASSERT_TRUE(gst_video_frame_map(&frame, const_cast<GstVideoInfo*>(&info), buffer, flags));
+      for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(&frame); ++c)
+        for (int y = 0; y < GST_VIDEO_FRAME_COMP_HEIGHT(&frame, c); ++y)
+          for (int x = 0; x < GST_VIDEO_FRAME_COMP_WIDTH(&frame, c); ++x)
+            see(c, x, y,
+                static_cast<uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(&frame, c)) +
+                    y * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c) +
+                    x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c));
+      gst_video_frame_unmap(&frame);
+    };
+    for (int t = 0; t < 40; ++t) {
+      BufferPtr buffer(gst_buffer_new_allocate(nullptr, info.size, nullptr));
+      stream.stamp(buffer.get(), t);
+      each_sample(buffer.get(), GST_MAP_WRITE, [&](guint c, int x, int y, uint8_t* sample) {
+        *sample = static_cast<uint8_t>(yuv && c > 0 ? 100 + 20 * c : grey_at(t, x, y));
+      });
+      ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+    }
+    const auto out = stream.take_all();
+    ASSERT_EQ(40u, out.size());
+    for (int t = 0; t < 40; ++t)
+      each_sample(out[static_cast<size_t>(t)].get(), GST_MAP_READ,
+                  [&](guint c, int x, int y, const uint8_t* sample) {
+                    int expected = 60 + x;
+                    if (mask)
+                      expected = grey_at(t, x, y) == 230 ? (yuv ? 235 : 255) : (yuv ? 16 : 0);
+                    if (yuv && c > 0) expected = mask ? 128 : static_cast<int>(100 + 20 * c);
+                    ASSERT_NEAR(expected, *sample, 1)
+                        << "frame " << t << " component " << c << " at " << x << " " << y;
+                  });
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Sizes, PlanarFormats,
+                         testing::Combine(testing::Values("GBR", "GRAY8", "I420", "NV12"),
+                                          testing::Values(64, 61), testing::Values(32, 31)),
+                         [](const auto& suite) {
+                           return std::string(std::get<0>(suite.param)) + "_" +
+                                  std::to_string(std::get<1>(suite.param)) + "x" +
+                                  std::to_string(std::get<2>(suite.param));
+                         });
+
+TEST(PlanarFormats, OnePixelOfEach) {
+  for (const char* format : {"GBR", "GRAY8", "I420", "NV12"})
+    for (const char* output : {"background", "foreground", "mask", "cutout"}) {
+      Stream stream(std::string("qdmdbackground window-size=3 regions=true output=") + output,
+                    gst_video_format_from_string(format), 1, 1);
+      for (int t = 0; t < 4; ++t) {
+        BufferPtr buffer(gst_buffer_new_allocate(nullptr, stream.info().size, nullptr));
+        gst_buffer_memset(buffer.get(), 0, 77, stream.info().size);
+        stream.stamp(buffer.get(), t);
+        ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+      }
+      ASSERT_TRUE(stream.eos());
+      EXPECT_EQ(4u, stream.take_all().size()) << format << " " << output;
+    }
+}
+
+// Outside of the mask a cut-out is black, which is no zero in Y, U and V.
+TEST(PlanarFormats, ACutoutIsBlackOutside) {
+  Stream stream("qdmdbackground window-size=4 output=cutout", GST_VIDEO_FORMAT_I420, 16, 16);
+  for (int t = 0; t < 4; ++t) {
+    BufferPtr buffer(gst_buffer_new_allocate(nullptr, stream.info().size, nullptr));
+    gst_buffer_memset(buffer.get(), 0, 90, stream.info().size);
+    stream.stamp(buffer.get(), t);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+  }
+  for (const auto& buffer : stream.take_all()) {
+    std::vector<uint8_t> bytes(stream.info().size);
+    gst_buffer_extract(buffer.get(), 0, bytes.data(), bytes.size());
+    for (size_t i = 0; i < bytes.size(); ++i) ASSERT_EQ(i < 256 ? 16 : 128, bytes[i]) << i;
+  }
+}
+
+// ---- Properties while playing ----
+
+TEST(Threads, ChangeWhilePlayingWithoutChangingPictures) {
+  for (const char* mode : {"batch", "live"}) {
+    std::vector<std::vector<uint8_t>> pictures[2];
+    for (int changing : {0, 1}) {
+      Stream stream(std::string("qdmdbackground window-size=12 n-threads=1 mode=") + mode,
+                    GST_VIDEO_FORMAT_RGB, 80, 60);
+      Element element(stream);
+      for (int t = 0; t < 60; ++t) {
+        if (changing && t % 7 == 3) element.set("n-threads", static_cast<guint>(1 + t % 4));
+        stream.push_many(t, 1);
+        for (const auto& buffer : stream.take_all()) {
+          pictures[changing].emplace_back(gst_buffer_get_size(buffer.get()));
+          gst_buffer_extract(buffer.get(), 0, pictures[changing].back().data(),
+                             pictures[changing].back().size());
+        }
+      }
+    }
+    EXPECT_EQ(pictures[0], pictures[1]) << mode;
+  }
+}
+
+// Everything that may change while playing changes all the time.
+TEST(PropertyStorm, LosesNoFrame) {
+  for (const char* mode : {"batch", "live"}) {
+    Stream stream(std::string("qdmdbackground window-size=6 mode=") + mode, GST_VIDEO_FORMAT_RGBA,
+                  40, 24);
+    Element element(stream);
+    std::atomic<bool> stop = false;
+    std::thread storm([&] {
+      for (guint i = 0; !stop; ++i) {
+        element.set("output", static_cast<gint>(i % 4), "foreground-threshold", (i % 50) * 1.0,
+                    "freeze", i % 11 == 0 ? TRUE : FALSE, "n-threads", i % 4, "post-messages",
+                    i % 2 ? TRUE : FALSE, "regions", i % 3 ? TRUE : FALSE, "regions-min-area",
+                    i % 20);
+        for (GstMessage* message : element.messages()) gst_message_unref(message);
+        g_usleep(200);
+      }
+    });
+    size_t out = 0;
+    for (int t = 0; t < 500; ++t) {
+      ASSERT_EQ(GST_FLOW_OK, stream.push(t));
+      out += stream.take_all().size();
+    }
+    stop = true;
+    storm.join();
+    ASSERT_TRUE(stream.eos());
+    out += stream.take_all().size();
+    EXPECT_EQ(500u, out) << mode;
+    for (GstMessage* message : element.messages()) gst_message_unref(message);
+  }
+}
+
+// A ramp from 0 to 100 levels over two seconds.
+TEST(Controller, ThresholdFollowsTheFramesTime) {
+  Stream stream("qdmdbackground window-size=25 output=mask", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  GstControlSource* source = gst_interpolation_control_source_new();
+  g_object_set(source, "mode", GST_INTERPOLATION_MODE_NONE, nullptr);
+  auto* values = GST_TIMED_VALUE_CONTROL_SOURCE(source);
+  // Up to 30 levels, then more than any residual has.
+  gst_timed_value_control_source_set(values, 0, 30.0 / 442);
+  gst_timed_value_control_source_set(values, 10 * kFrame, 1);
+  ASSERT_TRUE(gst_object_add_control_binding(
+      GST_OBJECT(element.get()),
+      gst_direct_control_binding_new(GST_OBJECT(element.get()), "foreground-threshold", source)));
+  gst_object_unref(source);
+  stream.push_many(0, 25);
+  const auto out = stream.take_all();
+  ASSERT_EQ(25u, out.size());
+  for (size_t t = 0; t < 25; ++t) {
+    int white = 0;
+    stream.each_pixel(out[t].get(), [&](int, int, const uint8_t* p, int) { white += p[0] > 0; });
+    if (t < 10)
+      EXPECT_GT(white, 10) << t;
+    else
+      EXPECT_EQ(0, white) << t;
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test
