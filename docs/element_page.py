@@ -15,7 +15,7 @@ PLAIN_NAMES = {'gboolean': 'boolean', 'guint': 'uint', 'gint': 'int', 'guint64':
                'gdouble': 'double', 'gchararray': 'string', 'GstStructure': 'structure',
                'GstSample': 'sample'}
 # Ends of a type's own range say nothing about the property.
-ENDS = {'guint': 2**32 - 1, 'gint': 2**31 - 1, 'guint64': 2**64 - 1, 'gdouble': sys.float_info.max}
+ENDS = {'guint': 2**31 - 1, 'gint': 2**31 - 1, 'guint64': 2**64 - 1, 'gdouble': sys.float_info.max}
 
 
 def cell(text):
@@ -51,7 +51,7 @@ def changeable(spec):
     if not flags & int(GObject.ParamFlags.WRITABLE):
         return 'read-only'
     if flags & Gst.PARAM_MUTABLE_PLAYING:
-        return 'any state'
+        return 'any state' + (', by controllers' if flags & Gst.PARAM_CONTROLLABLE else '')
     if flags & Gst.PARAM_MUTABLE_PAUSED:
         return 'NULL to PAUSED'
     if flags & Gst.PARAM_MUTABLE_READY:

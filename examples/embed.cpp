@@ -201,7 +201,9 @@ int run(const Options& options) {
     if (!message) continue;
     if (GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR) {
       gst_message_parse_error(message.get(), &failed, nullptr);
-      std::fprintf(stderr, "%s: %s\n", GST_OBJECT_NAME(message->src), Ref<GError>(failed)->message);
+      const char* where = GST_OBJECT_NAME(message->src);
+      if (file && message->src == GST_OBJECT(file.get())) where = options.video.c_str();
+      std::fprintf(stderr, "%s: %s\n", where, Ref<GError>(failed)->message);
       done = true;
       good = false;
     } else if (GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS) {

@@ -68,7 +68,7 @@ def print_regions(pad, info):
     return Gst.PadProbeReturn.OK
 
 
-def play(pipeline):
+def play(pipeline, options):
     """Plays to the end, or to Ctrl-C; returns an error's text, or None."""
     def interrupt():
         pipeline.send_event(Gst.Event.new_eos())
@@ -79,7 +79,8 @@ def play(pipeline):
 
     def at_message(bus, message):
         if message.type == Gst.MessageType.ERROR:
-            failure.append(f'{message.src.name}: {message.parse_error()[0].message}')
+            where = options.video if message.src.name == 'file' else message.src.name
+            failure.append(f'{where}: {message.parse_error()[0].message}')
         if message.type in (Gst.MessageType.ERROR, Gst.MessageType.EOS):
             loop.quit()
 
@@ -116,7 +117,7 @@ def main():
         pipeline, separator = make_pipeline(options)
     except GLib.Error as error:
         return error.message
-    failure = play(pipeline) or save_plate(separator, options.plate)
+    failure = play(pipeline, options) or save_plate(separator, options.plate)
     pipeline.set_state(Gst.State.NULL)
     return failure
 

@@ -48,13 +48,15 @@ def logical_lines(text, first_line):
             continue
         yield start, joined.strip()
         joined, start = '', None
+    if joined:
+        yield start, joined.strip()
 
 
 def scripts_of(page):
     """(language, text, first line) of every block of code."""
     text = page.read_text()
     if page.suffix == '.md':
-        blocks = re.finditer(r'^```(\w*)\n(.*?)^```', text, re.S | re.M)
+        blocks = re.finditer(r'^ *```(\w*)\n(.*?)^ *```', text, re.S | re.M)
         return [(b[1], b[2], text[:b.start(2)].count('\n') + 1) for b in blocks]
     blocks = re.finditer(r'\|\[\n(.*?)\n \* \]\|', text, re.S)
     return [('sh', re.sub(r'^ \* ?', '', b[1], flags=re.M), text[:b.start(1)].count('\n') + 1)
@@ -138,7 +140,7 @@ def check_command(language, line, folder):
             if not path.exists():
                 FILE_MAKERS[path.suffix](path)
 
-    run = subprocess.run(['gst-launch-1.0', '-v', *words], cwd=folder, timeout=120,
+    run = subprocess.run(['gst-launch-1.0', '-v', *words], cwd=folder, timeout=60,
                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     said = [text for text in run.stdout.splitlines() if not re.match(r'/.*: .* = ', text)]
     assert run.returncode == 0, '\n'.join([' '.join(words), *said])
