@@ -148,10 +148,13 @@ static std::vector<Region> next_regions(GstQdmdBackground* self, int least_area)
 }
 
 static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
+  gint id = 0;
   for (const Region& region : regions) {
     auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", guint(region.x),
                                                               guint(region.y), guint(region.width),
                                                               guint(region.height));
+    // Languages that cannot walk through metadata ask for a number.
+    meta->id = id++;
     gst_video_region_of_interest_meta_add_param(
         meta, gst_structure_new("foreground", "area", G_TYPE_UINT, guint(region.area),
                                 "mean-residual", G_TYPE_DOUBLE, region.mean_residual, nullptr));
