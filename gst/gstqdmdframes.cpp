@@ -65,6 +65,8 @@ static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 f
   frames->counters.frames_in += frames_in;
   frames->counters.frames_out += frames_out;
   frames->counters.solves = frames->engine.solves();
+  frames->counters.solve_period = guint(frames->engine.time_budget().period());
+  frames->counters.time_per_frame = 1000 * frames->engine.time_budget().predicted();
   frames->report = frames->engine.report();
   GST_OBJECT_UNLOCK(self);
 }
@@ -115,15 +117,17 @@ static void tell_of_solve(GstQdmdBackground* self) {
 
   GST_OBJECT_LOCK(self);
   const bool post = frames->settings.post_messages;
+  const Counters counters = frames->counters;
   if (sample) std::swap(frames->background, sample);
   GST_OBJECT_UNLOCK(self);
   // The old sample ends here, without the lock.
   sample.reset();
   if (post)
     gst_element_post_message(
-        GST_ELEMENT(self), gst_message_new_element(
-                               GST_OBJECT(self), make_solve_message(frames->engine.report(),
-                                                                    segment, timestamp, duration)));
+        GST_ELEMENT(self),
+        gst_message_new_element(
+            GST_OBJECT(self),
+            make_solve_message(frames->engine.report(), counters, segment, timestamp, duration)));
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -282,6 +286,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   GST_OBJECT_LOCK(self);
   const bool freeze = frames->settings.freeze;
   const int threads = frames->settings.engine.threads;
+  const double budget = frames->settings.time_budget;
   GST_OBJECT_UNLOCK(self);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
@@ -299,6 +304,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       frames->shells.push_back(std::move(shell));
       frames->engine.set_freeze(freeze);
       frames->engine.set_threads(threads);
+      frames->engine.set_time_budget(budget / 1000);
       return frames->engine.push(frames->io.read(frame));
     });
     if (!taken) {

@@ -162,6 +162,13 @@ const Property kProperties[] = {
                                 0, G_MAXINT, guint(d.regions_min_area), kAnyTime);
      },
      QDMD_UINT(s.regions_min_area)},
+    {[](const Settings& d) {
+       return g_param_spec_double("time-budget", "Time budget",
+                                  "Milliseconds that a frame may take on average (0: no limit); "
+                                  "backgrounds are solved as seldom as that needs",
+                                  0, 1e6, d.time_budget, kAnyTime);
+     },
+     QDMD_DOUBLE(s.time_budget)},
 };
 
 }  // namespace

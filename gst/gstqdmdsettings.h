@@ -12,12 +12,13 @@ struct Settings {
   Output output = Output::background;
   bool freeze = false, post_messages = false, regions = false;
   int regions_min_area = 0;  // pixels
+  double time_budget = 0;    // milliseconds a frame; 0: no limit
   EngineOptions engine;
 };
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 19;
+inline constexpr guint kFirstFreeProperty = 20;
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.
 bool set_setting(Settings* settings, guint id, const GValue* value);

@@ -13,7 +13,8 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
       G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
       report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
       "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
-      nullptr);
+      "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame", G_TYPE_DOUBLE,
+      counters.time_per_frame, nullptr);
   GValue lambda = G_VALUE_INIT, part = G_VALUE_INIT;
   gst_value_array_init(&lambda, 2);
   g_value_init(&part, G_TYPE_DOUBLE);
@@ -26,8 +27,9 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
   return stats;
 }
 
-GstStructure* make_solve_message(const SolveReport& report, const GstSegment& segment,
-                                 GstClockTime timestamp, GstClockTime duration) {
+GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,
+                                 const GstSegment& segment, GstClockTime timestamp,
+                                 GstClockTime duration) {
   guint64 stream_time = GST_CLOCK_TIME_NONE, running_time = GST_CLOCK_TIME_NONE;
   if (segment.format == GST_FORMAT_TIME && GST_CLOCK_TIME_IS_VALID(timestamp)) {
     stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, timestamp);
@@ -41,7 +43,8 @@ GstStructure* make_solve_message(const SolveReport& report, const GstSegment& se
       report.dmd.lambda.real(), "lambda-imaginary", G_TYPE_DOUBLE, report.dmd.lambda.imag(),
       "omega", G_TYPE_DOUBLE, report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual,
       "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio, "solve-time", G_TYPE_DOUBLE,
-      report.solve_time, nullptr);
+      report.solve_time, "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame",
+      G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
 }
 
 }  // namespace qdmd

@@ -9,13 +9,18 @@ namespace qdmd {
 
 struct Counters {
   guint64 frames_in = 0, frames_out = 0, solves = 0;
+  // What the time budget came to: of so many windows (live: hops) one is solved, and milliseconds
+  // for each frame.
+  guint solve_period = 1;
+  double time_per_frame = 0;
 };
 
 // The property `stats`.
 GstStructure* make_stats(const SolveReport& report, const Counters& counters);
 
 // The element message of a solve. timestamp and duration: of the frames that come out with it.
-GstStructure* make_solve_message(const SolveReport& report, const GstSegment& segment,
-                                 GstClockTime timestamp, GstClockTime duration);
+GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,
+                                 const GstSegment& segment, GstClockTime timestamp,
+                                 GstClockTime duration);
 
 }  // namespace qdmd

@@ -1,6 +1,7 @@
 #include "core/background/engine.h"
 
 #include <algorithm>
+#include <chrono>
 #include <thread>
 
 #include "core/background/planes.h"
@@ -22,6 +23,21 @@ int thread_count(int threads) {
   return static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1,
                                                unsigned{EngineOptions::kMaxThreads}));
 }
+
+// Adds the seconds that it lives.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double* seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
 
 // Calls pass(first_row, row_count) for bands of a picture's rows.
 template <typename Pass>
@@ -83,7 +99,9 @@ void Engine::flush() {
   solver_.forget();
   live_.restart(false);
   pending_ = ready_ = not_in_gram_ = 0;
-  has_model_ = start_new_window_ = frozen_ = false;
+  has_model_ = start_new_window_ = frozen_ = skip_solve_ = false;
+  stretch_frames_ = 0;
+  stretch_seconds_ = stretch_solve_ = 0;
 }
 
 // Makes room for the frame and splits it.
@@ -106,6 +124,9 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
   if (frame.width != width_ || frame.height != height_)
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
+  if (options_.mode == Mode::batch && pending_ == 0) begin_stretch();
+  const Stopwatch watch(&stretch_seconds_);
+  ++stretch_frames_;
   follow_threads();
   if (options_.mode == Mode::live)
     push_live(frame);
@@ -124,15 +145,24 @@ void Engine::follow_threads() {
   side_->set_active(threads > 1);
 }
 
+// The stretch before is over: its cost is known. Decides whether the next one is solved.
+void Engine::begin_stretch() {
+  budget_.add(stretch_frames_, stretch_seconds_, stretch_solve_);
+  stretch_frames_ = 0;
+  stretch_seconds_ = stretch_solve_ = 0;
+  skip_solve_ = !budget_.next();
+}
+
 void Engine::push_batch(const ImageView& frame) {
-  if (pending_ == 0 && has_model_ && freeze_ != frozen_) {
+  const bool freeze = freeze_ || skip_solve_;
+  if (pending_ == 0 && has_model_ && freeze != frozen_) {
     // The model may still read its window, whose frames are about to make room. Frames that came
     // meanwhile are in no Gram matrix.
-    if (freeze_)
+    if (freeze)
       solver_.model().freeze_at(window_.size() - 1);
     else
       start_new_window_ = true;
-    frozen_ = freeze_;
+    frozen_ = freeze;
   }
   if (start_new_window_) {
     side_->finish();
@@ -165,6 +195,7 @@ void Engine::solve() {
     not_in_gram_ = 0;
     return;
   }
+  const Stopwatch watch(&stretch_solve_);
   side_->finish();
   const SnapshotRange window(window_);
   if (pending_ < window_.size())
@@ -205,8 +236,17 @@ void Engine::push_live(const ImageView& frame) {
   take_in(frame);
   // Frozen, too: its ring keeps in step with the window's.
   solver_.append(window_);
-  if (!freeze)
-    count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_));
+  if (!freeze) {
+    const auto solve_now = [this] {
+      // The work of the stretch is over; beside the frames, it was none of theirs.
+      stretch_solve_ = live_.take_work_seconds();
+      if (side_->active() && !live_.small()) stretch_seconds_ += stretch_solve_;
+      begin_stretch();
+      return !skip_solve_ || !has_model_;
+    };
+    count(live_.start(window_, options_.foreground_threshold, live_.small() || !has_model_,
+                      solve_now));
+  }
   if (!frozen_) solver_.follow_light(window_.slot(window_.size() - 1));
   ready_ = 1;
 }
@@ -260,6 +300,7 @@ bool Engine::write_background(const MutableImageView& out) {
 
 void Engine::pop(Output output, const MutableImageView& out) {
   if (ready_ == 0) return;
+  const Stopwatch watch(&stretch_seconds_);
   const OutputTask task = next_task(output);
   if (side_->idle())
     for_bands(*pool_, width_, height_,

@@ -7,6 +7,7 @@
 #include "core/background/alpha_store.h"
 #include "core/background/engine_options.h"
 #include "core/background/live_solver.h"
+#include "core/background/time_budget.h"
 #include "core/parallel/side_thread.h"
 
 namespace qdmd {
@@ -57,6 +58,10 @@ class Engine {
   // While on, the background stays the picture that it was, and nothing is solved; only the first
   // model is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
+  // Seconds that a frame may take on average; 0: no limit. Solves become as rare as that needs, and
+  // pictures then depend on time.
+  void set_time_budget(double seconds_per_frame) { budget_.set(seconds_per_frame); }
+  const TimeBudget& time_budget() const { return budget_; }
   // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
   void set_threads(int threads) { threads_ = threads; }
 
@@ -66,6 +71,7 @@ class Engine {
   void take_in(const ImageView& frame);
   void push_batch(const ImageView& frame);
   void push_live(const ImageView& frame);
+  void begin_stretch();
   void add_group(int frames);
   void solve();
 
@@ -90,6 +96,12 @@ class Engine {
   bool has_model_ = false, start_new_window_ = false;
   bool freeze_ = false, frozen_ = false;  // as asked for, and as done
   int threads_ = 0;                       // as asked for; options_ has what is done
+
+  TimeBudget budget_;
+  // Of the stretch that runs: frames, seconds in push() and pop(), of which in a solve.
+  int stretch_frames_ = 0;
+  double stretch_seconds_ = 0, stretch_solve_ = 0;
+  bool skip_solve_ = false;  // batch: the window that runs keeps the background
 
   // The last member: it ends before what it works on.
   std::unique_ptr<SideThread> side_;

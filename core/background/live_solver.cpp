@@ -1,6 +1,7 @@
 #include "core/background/live_solver.h"
 
 #include <algorithm>
+#include <chrono>
 
 namespace qdmd {
 
@@ -35,8 +36,10 @@ bool LiveSolver::settle() {
   return publish();
 }
 
-bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_once) {
-  const LiveSchedule::Step step = schedule_.next();
+bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_once,
+                       const std::function<bool()>& solve_now) {
+  LiveSchedule::Step step = schedule_.next();
+  if (step.solve) step.solve = solve_now();
   // Frames that are kept for a solve in progress are no part of the window.
   const int size = static_cast<int>(
       std::min<int64_t>({schedule_.frames(), schedule_.window_size(), window.size()}));
@@ -79,6 +82,12 @@ bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange
 
 // One frame's share. Pictures come first: the solve after them needs their place.
 void LiveSolver::work() {
+  const auto start = std::chrono::steady_clock::now();
+  do_share();
+  work_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void LiveSolver::do_share() {
   if (build_) {
     solver_->build(build_->done, build_->slices);
     if (++build_->done == build_->slices) {

@@ -1,7 +1,9 @@
 // Runs a WindowSolver beside the frames of a live stream.
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "core/background/live_schedule.h"
 #include "core/background/window_solver.h"
@@ -26,10 +28,15 @@ class LiveSolver {
   // True: a model was published. Throws what the work threw.
   bool settle();
   // Begins the work that comes with the newest frame of `window`. `at_once`: ends it, too. True: a
-  // model was published. fixed_threshold: for the foreground's statistics.
-  bool start(const Window& window, double fixed_threshold, bool at_once);
+  // model was published. fixed_threshold: for the foreground's statistics. solve_now: asked before
+  // each solve that the schedule has; where it says no, there is none.
+  bool start(const Window& window, double fixed_threshold, bool at_once,
+             const std::function<bool()>& solve_now);
   // Drops the work that is under way.
   void stop();
+
+  // Seconds of work since the last call. While nothing is under way.
+  double take_work_seconds() { return std::exchange(work_seconds_, 0.0); }
 
   // The newest frame's time in the published model.
   double time() const { return static_cast<double>(schedule_.frames() - 1 - model_start_); }
@@ -52,6 +59,7 @@ class LiveSolver {
 
   bool start_piece(const LiveSchedule::Step& step, const SnapshotRange& span, bool at_once);
   void work();
+  void do_share();
   bool publish();
 
   LiveSchedule schedule_;
@@ -63,7 +71,7 @@ class LiveSolver {
   std::optional<Build> build_;
   std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
   std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
-  double fixed_threshold_ = 0;
+  double fixed_threshold_ = 0, work_seconds_ = 0;
 };
 
 }  // namespace qdmd

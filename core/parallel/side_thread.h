@@ -26,6 +26,8 @@ class SideThread {
   void start(std::function<void()> work);
   // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
   void finish();
+  // True where start() has a thread of its own for its work.
+  bool active() const { return thread_.joinable(); }
   // True where nothing runs.
   bool idle();
 

@@ -52,7 +52,8 @@ struct Spread {
     has_model |= published;
     append_frame(window, frame);
     solver.append(window);
-    published |= live.start(window, options.foreground_threshold, live.small() || !has_model);
+    published |= live.start(window, options.foreground_threshold, live.small() || !has_model,
+                            [] { return true; });
     has_model |= published;
     return published;
   }

@@ -397,7 +397,7 @@ TEST(PropertyStorm, LosesNoFrame) {
         element.set("output", static_cast<gint>(i % 4), "foreground-threshold", (i % 50) * 1.0,
                     "freeze", i % 11 == 0 ? TRUE : FALSE, "n-threads", i % 4, "post-messages",
                     i % 2 ? TRUE : FALSE, "regions", i % 3 ? TRUE : FALSE, "regions-min-area",
-                    i % 20);
+                    i % 20, "time-budget", i % 5 == 0 ? 0.01 * i : 0.0);
         for (GstMessage* message : element.messages()) gst_message_unref(message);
         g_usleep(200);
       }
@@ -416,7 +416,44 @@ TEST(PropertyStorm, LosesNoFrame) {
   }
 }
 
-// A ramp from 0 to 100 levels over two seconds.
+// No frame is so fast: backgrounds are solved as seldom as it goes.
+TEST(TimeBudget, MakesSolvesRare) {
+  Stream stream("qdmdbackground window-size=4 post-messages=true", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Element element(stream);
+  const auto stat = [&](const char* name) {
+    GstStructure* stats = nullptr;
+    g_object_get(element.get(), "stats", &stats, nullptr);
+    guint64 solves = 0;
+    guint period = 0;
+    gst_structure_get_uint64(stats, name, &solves);
+    gst_structure_get_uint(stats, name, &period);
+    gst_structure_free(stats);
+    return solves + period;
+  };
+  stream.push_many(0, 40);
+  EXPECT_EQ(10u, stat("solves"));
+  EXPECT_EQ(1u, stat("solve-period"));
+  element.set("time-budget", 0.000001);
+  stream.push_many(40, 4 * 64);
+  const guint64 solves = stat("solves") - 10;
+  EXPECT_GE(solves, 4u);
+  EXPECT_LE(solves, 6u);
+  EXPECT_EQ(16u, stat("solve-period"));
+  element.set("time-budget", 0.0);
+  stream.push_many(296, 40);
+  EXPECT_EQ(10 + solves + 10, stat("solves"));
+  EXPECT_EQ(336u, stream.take_all().size());
+  for (GstMessage* message : element.messages()) {
+    const GstStructure* s = gst_message_get_structure(message);
+    guint period = 0;
+    double time = -1;
+    EXPECT_TRUE(gst_structure_get(s, "solve-period", G_TYPE_UINT, &period, "time-per-frame",
+                                  G_TYPE_DOUBLE, &time, nullptr));
+    EXPECT_GE(time, 0);
+    gst_message_unref(message);
+  }
+}
+
 TEST(Controller, ThresholdFollowsTheFramesTime) {
   Stream stream("qdmdbackground window-size=25 output=mask", GST_VIDEO_FORMAT_RGB, 40, 24);
   Element element(stream);
