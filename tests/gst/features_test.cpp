@@ -389,7 +389,7 @@ TEST(PropertyStorm, LosesNoFrame) {
   constexpr int kFrames = 200;
   for (const char* mode : {"batch", "live hop-size=3", "live hop-size=2 method=qdmd"}) {
     Stream stream(std::string("qdmdbackground window-size=6 mode=") + mode, GST_VIDEO_FORMAT_RGBA,
-                  40, 24);
+                  20, 12);
     Element element(stream);
     std::atomic<bool> stop = false;
     std::thread storm([&] {
