@@ -12,12 +12,13 @@ import matplotlib
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt
 
-PEERS = (('qdmd', 'qdmdbackground'), ('qdmd_rank_1', 'qdmdbackground rank=1'),
-         ('qdmd_live', 'mode=live'), ('segmentation', 'segmentation'), ('mog2', 'OpenCV MOG2'),
+PEERS = (('robust', 'method=robust'), ('qdmd', 'method=qdmd'), ('qdmd_rank_1', 'method=qdmd rank=1'),
+         ('qdmd_live', 'method=qdmd mode=live'), ('segmentation', 'segmentation'), ('mog2', 'OpenCV MOG2'),
          ('knn', 'OpenCV KNN'), ('cnt', 'OpenCV CNT'), ('median', 'median'))
 STAGES = ('conversion', 'Gram', 'solve', 'combination', 'statistics', 'output')
 # Colours of Okabe and Ito, told apart by all eyes.
-COLOURS = ('#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999', '#000000')
+COLOURS = ('#F0E442', '#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999',
+           '#000000')
 # The share of memory's speed below which a pass computes, and from which on it waits for memory.
 ARITHMETIC_BELOW, MEMORY_FROM = 0.5, 0.8
 
@@ -94,7 +95,7 @@ def promises(results):
             rows.append([f'{case[0]}x{case[1]}', str(case[2]), figure(run['net/qdmd']),
                          figure(run['net/segmentation']), figure(run['times/qdmd']), f'{least}',
                          figure(run['cpu/segmentation'] / run['cpu/qdmd'])])
-    return table(['size', 'window-size', 'qdmdbackground, ms', 'segmentation, ms',
+    return table(['size', 'window-size', 'method=qdmd, ms', 'segmentation, ms',
                   'times as fast', 'promised', 'times less processor time'], rows)
 
 

@@ -206,7 +206,8 @@ class MedianPeer : public Peer {
 
 std::vector<std::unique_ptr<Peer>> peers_of(const Frames& frames) {
   const auto window = static_cast<size_t>(frames.size.window);
-  const std::string qdmd = "qdmdbackground output=mask window-size=";
+  const std::string robust = "qdmdbackground output=mask window-size=";
+  const std::string qdmd = "qdmdbackground output=mask method=qdmd window-size=";
   std::vector<std::unique_ptr<Peer>> peers;
   const auto element = [&](const char* name, const std::string& description, size_t at_once,
                            size_t warm_up) {
@@ -217,6 +218,7 @@ std::vector<std::unique_ptr<Peer>> peers_of(const Frames& frames) {
                                                      std::min<size_t>(window, 30)));
   };
   element("identity", "identity", 1, 2);
+  element("robust", robust + std::to_string(window), window, window);
   element("qdmd", qdmd + std::to_string(window), window, window);
   element("qdmd_rank_1", qdmd + std::to_string(window) + " rank=1", window, window);
   element("qdmd_live",
