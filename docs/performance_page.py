@@ -17,8 +17,8 @@ PEERS = (('robust', 'method=robust'), ('qdmd', 'method=qdmd'), ('qdmd_rank_1', '
          ('knn', 'OpenCV KNN'), ('cnt', 'OpenCV CNT'), ('median', 'median'))
 STAGES = ('conversion', 'Gram', 'solve', 'combination', 'statistics', 'output')
 # Colours of Okabe and Ito, told apart by all eyes.
-COLOURS = ('#F0E442', '#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999',
-           '#000000')
+COLOURS = ('#000000', '#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#CC79A7', '#999999',
+           '#F0E442')
 # The share of memory's speed below which a pass computes, and from which on it waits for memory.
 ARITHMETIC_BELOW, MEMORY_FROM = 0.5, 0.8
 
