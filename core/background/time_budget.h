@@ -5,8 +5,8 @@ namespace qdmd {
 
 // Frames come in stretches: windows in batch mode, hops in live mode. A stretch is solved, or keeps
 // the background that there is. What both take is measured; of every period() stretches one is
-// solved, as often as the budget allows. Docs: docs/accuracy-vs-time.md has what a period costs in
-// accuracy; no other setting buys as much time for as little of it.
+// solved, as often as the budget allows. Frames, pixels and iterations stay as they are: a
+// background of the window before differs little where fewer of them would differ in each frame.
 class TimeBudget {
  public:
   // More seldom than once in so many stretches makes hardly anything cheaper.
