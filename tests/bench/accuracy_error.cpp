@@ -1,0 +1,192 @@
+#include "tests/bench/accuracy_error.h"
+
+#include <algorithm>
+#include <memory>
+#include <random>
+
+#include "core/dmd/decompose.h"
+#include "tests/bench/accuracy_quality.h"
+#include "tests/core/solver_names.h"
+#include "tests/stability/assessment.h"
+#include "tests/stability/reference.h"
+
+namespace qdmd::bench {
+namespace {
+
+using stability::HardCase;
+
+constexpr Solver kSolvers[] = {Solver::gram, Solver::gram_extended, Solver::qr, Solver::adjoint};
+// More pixels than the complex adjoint has memory and patience for.
+constexpr size_t kMostForAdjoint = 1000;
+
+// How many frames a light goes out in, and the largest level of a picture that leaves it room.
+struct Fade {
+  const char* name;
+  int frames, most;
+};
+// The first has more frames than singular values: these come from an SVD or from a Hermitian
+// eigenproblem. The second has full rank and is a pencil of triangular matrices.
+constexpr Fade kFades[] = {{"two pictures; rank 2 of 4", 5, 14},
+                           {"two pictures; full rank", 3, 50}};
+
+// Picture B under a light that is halved from frame to frame: x_t = 2^-t A + B, without rounding. B
+// is A but for one level at one pixel, so that the snapshots differ in direction by less and less
+// the more pixels there are. Both modes are there at full strength, with the eigenvalues 1/2 and 1:
+// to tell them apart takes the small singular value. (The background of a still picture with noise
+// would show little, it belongs to the largest singular value alone.)
+Window two_pictures(const Fade& fade, size_t pixels, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> level(1, fade.most);
+  std::vector<uint8_t> picture(3 * pixels);
+  for (auto& sample : picture) sample = static_cast<uint8_t>(level(rng));
+  Window window(fade.frames, pixels);
+  for (int t = 0; t < fade.frames; ++t) {
+    const int slot = window.append();
+    const int strength = (1 << (fade.frames - 1 - t)) + 1;
+    for (size_t c = 0; c < kChannels; ++c) {
+      uint8_t* const plane = window.plane(slot, static_cast<int>(c));
+      for (size_t p = 0; p < pixels; ++p)
+        plane[p] = static_cast<uint8_t>(picture[c * pixels + p] * strength);
+    }
+    ++window.plane(slot, 1)[pixels / 2];
+  }
+  return window;
+}
+
+void measure_case(const std::string& scenes, const HardCase& hard_case, Table* table) {
+  const auto point_of = [&](Solver solver) {
+    Point point{"error", scenes, hard_case.name, "qdmd", test::name_of(solver), 0, 1, 0, 1, 0, 0};
+    std::replace(point.name.begin(), point.name.end(), ',', ';');
+    return point;
+  };
+  if (std::all_of(std::begin(kSolvers), std::end(kSolvers), [&](Solver solver) {
+        return table->has(point_of(solver)) || (solver == Solver::adjoint && hard_case.large);
+      }))
+    return;
+  const auto assessment = stability::assess(hard_case, Amplitude::window);
+  for (const auto& result : assessment.solvers) {
+    const Point point = point_of(result.solver);
+    if (table->has(point)) continue;
+    table->add(point, {{"condition", assessment.condition},
+                       {"movement", assessment.movement},
+                       {"sensitivity", assessment.sensitivity},
+                       {"lambda_error", result.lambda_error},
+                       {"background_error", result.background_error},
+                       {"rank_found", result.rank},
+                       // Fewer singular values than there are: another problem was solved.
+                       {"moved", assessment.rank - result.rank}});
+  }
+}
+
+IntegerMatrix gram_of(const Window& window) {
+  SlidingGram gram(window.capacity());
+  gram.add_newest(window, window.size());
+  return gram.matrix(window);
+}
+
+Window window_of(const TrueClip& clip) {
+  const cv::Size size = clip.frames[0].size();
+  Window window(static_cast<int>(clip.frames.size()), static_cast<size_t>(size.area()));
+  for (const cv::Mat& frame : clip.frames) {
+    const int slot = window.append();
+    for (int p = 0; p < size.area(); ++p)
+      for (int c = 0; c < kChannels; ++c) window.plane(slot, c)[p] = frame.data[3 * p + 2 - c];
+  }
+  return window;
+}
+
+// Some pixels all over the picture.
+Eigen::MatrixXd probes_of(const Window& window) {
+  constexpr Eigen::Index kProbes = 64;
+  Eigen::MatrixXd pixels(3 * kProbes, window.size());
+  for (int t = 0; t < window.size(); ++t)
+    for (Eigen::Index i = 0; i < kProbes; ++i)
+      for (int c = 0; c < kChannels; ++c)
+        pixels(3 * i + c, t) = window.plane(
+            window.slot(t), c)[static_cast<size_t>(i) * (window.pixels() - 1) / (kProbes - 1)];
+  return pixels;
+}
+
+void measure_solvers(const std::string& scene, int frames, int turns, double seconds,
+                     Table* table) {
+  constexpr int kWidth = 96, kHeight = 72;
+  const TrueClip clip = simulated(scene, kWidth, kHeight, frames);
+  const Window window = window_of(clip);
+  const IntegerMatrix gram = gram_of(window);
+  const stability::Reference reference(gram, probes_of(window));
+  std::vector<Point> points;
+  std::vector<Values> values;
+  std::vector<Job> jobs;
+  for (int rank : {0, 3, 1}) {
+    DmdOptions options;
+    options.rank = rank;
+    const auto exact = reference.solve(options);
+    for (Solver solver : kSolvers) {
+      // Its SVD takes minutes for more.
+      if (solver == Solver::adjoint && frames > 12) continue;
+      options.solver = solver;
+      const Point point{"error", "solvers", scene,  "qdmd", test::name_of(solver), rank, 1,
+                        frames,  1,         kWidth, kHeight};
+      if (table->has(point)) continue;
+      const auto modes = quaternion_modes(window, gram, options);
+      const auto error = stability::distance(exact, reference.answer(modes));
+      points.push_back(point);
+      values.push_back({{"lambda_error", error.lambda},
+                        {"background_error", error.background},
+                        {"rank_found", modes.summary.rank},
+                        {"condition", modes.summary.condition}});
+      // From the frames to L(t), whatever the solver starts from.
+      jobs.push_back({[&window, options] {
+                        const bool from_gram = options.solver == Solver::gram ||
+                                               options.solver == Solver::gram_extended;
+                        decompose(window,
+                                  from_gram ? gram_of(window) : IntegerMatrix(3 * window.size(), 0),
+                                  options);
+                      },
+                      static_cast<double>(frames)});
+    }
+  }
+  const auto times = in_turn(jobs, turns, seconds);
+  for (size_t i = 0; i < points.size(); ++i) {
+    times[i].put(&values[i]);
+    table->add(points[i], values[i]);
+  }
+}
+
+}  // namespace
+
+void add_conditions(bool brief, Table* table, Steps* steps) {
+  const unsigned seeds = brief ? 1 : 5;
+  const size_t most = brief ? 1000 : 8000000;
+  for (const Fade& fade : kFades)
+    for (size_t pixels = 2; pixels < most; pixels *= brief ? 8 : 4)
+      for (unsigned seed = 1; seed <= seeds; ++seed) {
+        const std::string name = std::to_string(pixels) + " pixels; seed " + std::to_string(seed);
+        steps->push_back({"error: " + std::string(fade.name) + ", " + name, [=, &fade] {
+                            measure_case(
+                                fade.name,
+                                {name, "", [=, &fade] { return two_pictures(fade, pixels, seed); },
+                                 pixels > kMostForAdjoint},
+                                table);
+                          }});
+      }
+}
+
+void add_hard_cases(bool brief, Table* table, Steps* steps) {
+  for (const HardCase& hard_case : stability::hard_cases()) {
+    // A window of more than a thousand frames takes a minute in 50 digits.
+    if (hard_case.name == "1024 frames" || (brief && hard_case.large)) continue;
+    steps->push_back({"error: " + hard_case.name,
+                      [&hard_case, table] { measure_case("hard cases", hard_case, table); }});
+  }
+}
+
+void add_solvers(bool brief, int turns, double seconds, Table* table, Steps* steps) {
+  const std::vector<int> windows = brief ? std::vector<int>{8} : std::vector<int>{12, 25, 50};
+  for (const std::string scene : {"basic", "illumination-changes"})
+    for (int frames : windows)
+      steps->push_back({"error: " + scene + ", " + std::to_string(frames) + " frames",
+                        [=] { measure_solvers(scene, frames, turns, seconds, table); }});
+}
+
+}  // namespace qdmd::bench
