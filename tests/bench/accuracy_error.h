@@ -6,7 +6,7 @@
 
 namespace qdmd::bench {
 
-// Windows of two pictures that differ by less and less.
+// Windows of pictures that differ by less and less.
 void add_conditions(bool brief, Table* table, Steps* steps);
 
 // tests/stability's own.

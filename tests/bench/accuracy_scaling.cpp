@@ -171,12 +171,12 @@ void add_scaling(bool brief, int turns, double seconds, Table* table, Steps* ste
     for (const Size& size : sizes) add_gram(sweep, fixed_window, size);
   });
   add("Gram matrix, window", [=](Sweep* sweep) {
-    for (int window : windows({25, 50, 100, 150, 200, 300, 400}))
+    for (int window : windows({25, 50, 100, 150, 200, 300, 400, 600}))
       add_gram(sweep, window, {160, 120});
   });
   add("small problem, window", [=](Sweep* sweep) {
-    constexpr Size kTiny = {40, 30};
-    for (int window : windows({25, 50, 100, 200, 400, 800})) {
+    constexpr Size kTiny = {48, 36};  // more pixels than frames
+    for (int window : windows({25, 50, 100, 200, 400, 800, 1200})) {
       const auto problem = small_problem(window, kTiny);
       add_solve(sweep, problem, kTiny, Solver::gram, 0);
       if (window > 400) continue;

@@ -33,7 +33,8 @@ const std::vector<std::string> kValueColumns = {"turns",
                                                 "sensitivity",
                                                 "lambda_error",
                                                 "background_error",
-                                                "rank_found"};
+                                                "rank_found",
+                                                "dropped"};
 
 std::string head() {
   std::string text = kPointColumns;
