@@ -63,8 +63,9 @@ class Quality:
             if not values:
                 return None
             peak = max(peak, values['peak_mb'])
-            cells += [f'{values["age"]:.2f}', f'{values["psnr"]:.1f}', f'{values["cqm"]:.1f}',
-                      figure(values['ms']),
+            cells += ['', '', ''] if values['age'] is None else [
+                f'{values["age"]:.2f}', f'{values["psnr"]:.1f}', f'{values["cqm"]:.1f}']
+            cells += [figure(values['ms']),
                       f'{figure(values["ms_low"])} to {figure(values["ms_high"])}']
         return cells + [f'{peak:.0f}']
 
@@ -105,7 +106,9 @@ class Quality:
                  for rank in (1, 0)]
         rows += [(f'`dmd`, rank {rank or "full"}, one window',
                   qdmd._replace(method='dmd', rank=rank)) for rank in (1, 0)]
-        rows += [(f'OpenCV {peer.upper()}' if peer in ('mog2', 'knn') else peer,
+        names = {'mog2': 'OpenCV MOG2', 'knn': 'OpenCV KNN',
+                 'segmentation': '`segmentation` (a mask alone)'}
+        rows += [(names.get(peer, peer),
                   Setting(peer, '-', 0, 1, WHOLE, 1)) for peer in results.PEERS]
         return self.table('what', rows)
 

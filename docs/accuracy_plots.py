@@ -107,13 +107,18 @@ def quality_against_time(folder, rows):
     for axis, (scenes, title) in zip(axes[0], shown):
         points = results.means(rows, scenes)
         for method, colour in METHODS.items():
-            group = [values for setting, values in points.items() if setting.method == method]
+            group = [values for setting, values in points.items()
+                     if setting.method == method and values['age'] is not None]
             if group:
                 axis.plot([values['ms'] for values in group],
                           [values['age'] for values in group], linestyle='none',
                           marker='*' if method in results.PEERS else 'o',
                           markersize=10 if method in results.PEERS else 4, color=colour,
                           alpha=0.8, label=method)
+        for setting, values in points.items():
+            if values['age'] is None:
+                axis.axvline(values['ms'], linestyle=':', color='#CC79A7', linewidth=1,
+                             label=setting.method)
         front = results.front(points)
         axis.plot([points[setting]['ms'] for setting in front],
                   [points[setting]['age'] for setting in front], color='black', linewidth=1,

@@ -18,7 +18,7 @@ PROMISED = (('Gram', 'width', 'time of the Gram matrix in pixels', 0, 1.0, 0.1),
              0.4))
 
 Setting = collections.namedtuple('Setting', 'method solver rank step window iterations')
-PEERS = ('median', 'mean', 'mog2', 'knn')
+PEERS = ('median', 'mean', 'mog2', 'knn', 'segmentation')
 DEFAULT = Setting('robust', 'gram', 0, 0, 100, 1)
 WHOLE = 300  # a window that has every clip in it
 
@@ -43,7 +43,8 @@ def setting_of(row):
 
 
 def means(rows, scenes):
-    """{setting: means over the clips}, of settings that every clip has."""
+    """{setting: means over the clips}, of settings that every clip has. `segmentation` has no
+    background, and no score."""
     rows = chosen(rows, part='quality', scenes=scenes)
     clips = {row['name'] for row in rows}
     by_setting = collections.defaultdict(list)
@@ -54,7 +55,7 @@ def means(rows, scenes):
         if {row['name'] for row in found} != clips:
             continue
         result[setting] = {
-            name: statistics.fmean(row[name] for row in found)
+            name: None if found[0][name] is None else statistics.fmean(row[name] for row in found)
             for name in ('age', 'age_worst', 'psnr', 'cqm', 'ms', 'ms_low', 'ms_high')}
         result[setting]['peak_mb'] = max(row['peak_mb'] for row in found)
         result[setting]['layout_mb'] = max(row['layout_mb'] or 0 for row in found) or None
@@ -65,7 +66,8 @@ def front(points):
     """Settings that no other beats in both AGE and time, the fastest first. Slower ones are better
     by a hundredth of a level at least."""
     best, kept = math.inf, []
-    for setting, values in sorted(points.items(), key=lambda item: (item[1]['ms'],
+    scored = {setting: values for setting, values in points.items() if values['age'] is not None}
+    for setting, values in sorted(scored.items(), key=lambda item: (item[1]['ms'],
                                                                     item[1]['age'])):
         if values['age'] < best - 0.01:
             best = values['age']

@@ -32,6 +32,7 @@ if [ "$form" != --page ]; then
   meson setup "${again[@]}" build -Dtests=enabled >/dev/null
   ninja -C build tests/bench/accuracy-cost
   if [ "$form" != --resume ]; then rm -f "$results/table.csv"; fi
+  export GST_REGISTRY_1_0="$PWD/$results/registry.bin"
   uptime >"$results/load-before"
   build/tests/bench/accuracy-cost "${options[@]}" "$results/table.csv"
   uptime >"$results/load-after"

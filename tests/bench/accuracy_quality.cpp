@@ -9,6 +9,7 @@
 #include "core/background/engine.h"
 #include "core/metrics/picture_scores.h"
 #include "core/scene/scene.h"
+#include "tests/bench/accuracy_segmentation.h"
 #include "tests/core/solver_names.h"
 #include "tests/evaluation/classic_methods.h"
 #include "tests/evaluation/clip.h"
@@ -233,6 +234,18 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
   std::vector<Entry> entries;
   for (const Setting& setting : settings(limits.brief)) entries.push_back(entry_of(clip, setting));
   for (const auto& peer : peers) entries.push_back(entry_of(clip, peer.get()));
+  if (auto work = segmentation_of(clip.frames)) {
+    Entry entry = entry_of(clip, peers.front().get());
+    entry.point.method = "segmentation";
+    entry.work = work;
+    entry.pictures = [work] {
+      work();
+      return std::vector<cv::Mat>();
+    };
+    entries.push_back(entry);
+  } else {
+    progress->problem("segmentation", "GStreamer has no such element here: it is left out");
+  }
   std::erase_if(entries, [&](const Entry& entry) { return table->has(entry.point); });
 
   // What sampling moves is seen beside all pixels of the same rank.
@@ -246,6 +259,7 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
       entry.work = nullptr;
       continue;
     }
+    if (pictures.empty()) continue;
     score(clip, pictures, &entry.values);
     if (!entry.setting || entry.setting->method != Method::qdmd ||
         entry.setting->solver != Solver::gram || entry.setting->window != kWhole)
