@@ -181,23 +181,15 @@ def solvers_table(rows):
 
 def growth_table(rows):
     lines = []
-    for name, method, solver, rank, title in (
-            ('Gram', 'qdmd', 'gram', 0, 'Gram matrix'),
-            ('solve', 'qdmd', 'gram', 0, 'small problem, `gram`, full rank'),
-            ('solve', 'qdmd', 'gram', 1, 'small problem, `gram`, rank 1'),
-            ('solve', 'qdmd', 'gram', 3, 'small problem, `gram`, rank 3'),
-            ('solve', 'qdmd', 'gram-extended', 0, 'small problem, `gram-extended`, full rank'),
-            ('solve', 'qdmd', 'qr', 0, 'small problem with its pixels, `qr`'),
-            ('engine', 'robust', 'gram', 0, 'everything, `method=robust`'),
-            ('engine', 'qdmd', 'gram', 0, 'everything, `method=qdmd`')):
-        cells = [title]
-        for along, least in (('width', 0), ('window', 50)):
-            points = results.growth(rows, name, along, least, method=method, solver=solver,
-                                    rank=rank)
-            slope = results.exponent(points)
+    for line in results.LINES:
+        cells = [line.title]
+        for along in results.GROWS:
+            points, slope = results.growth(rows, line, along)
+            fitted = [point for point in points
+                      if along == 'width' or point[0] >= line.first_window]
             cells += ['', ''] if slope is None else [
-                f'{slope:.2f}', f'{figure(points[0][1])} ({points[0][0]:.0f}) to '
-                f'{figure(points[-1][1])} ({points[-1][0]:.0f})']
+                f'{slope:.2f}', f'{figure(fitted[0][1])} ({fitted[0][0]:.0f}) to '
+                f'{figure(fitted[-1][1])} ({fitted[-1][0]:.0f})']
         lines.append(cells)
     return table(['what', 'exponent in pixels', 'ms a window (pixels)', 'exponent in the window',
                   'ms a window (frames)'], lines)

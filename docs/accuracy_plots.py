@@ -57,7 +57,7 @@ def error_against_condition(folder, rows):
                       linewidth=1, label=label)
         axis.set(xscale='log', yscale='log', xlim=ends, ylim=(LEAST / 2, 10))
         finish(axis, title, 'condition number of X', 'relative error, against 50 digits',
-               loc='upper left')
+               legend=scenes == shown[0][0], loc='upper left')
     save(folder, 'error-condition', drawing)
 
 
@@ -77,7 +77,7 @@ def error_against_time(folder, rows):
                               label=f'{solver}, m = {window:.0f}')
         conditions = [row['condition'] for row in results.chosen(found, rank=rank)]
         axis.set(xscale='log', yscale='log')
-        axis.set_ylim(1e-16, 1e-12)
+        axis.set_ylim(1e-16, 1e-11)
         finish(axis, f'{RANKS[rank][1]}, condition {min(conditions):.0f} to '
                f'{max(conditions):.0f}' if rank != 1 else RANKS[rank][1], 'ms a frame',
                'relative error, against 50 digits', legend=rank == 0, loc='upper right')
@@ -136,24 +136,15 @@ def quality_against_time(folder, rows):
 
 
 def growth(folder, rows):
-    lines = [('Gram', 'qdmd', 'gram', 0, 'Gram matrix', '#000000'),
-             ('solve', 'qdmd', 'gram', 0, 'solve: gram, full rank', '#D55E00'),
-             ('solve', 'qdmd', 'gram', 1, 'solve: gram, rank 1', '#E69F00'),
-             ('solve', 'qdmd', 'gram', 3, 'solve: gram, rank 3', '#CC79A7'),
-             ('solve', 'qdmd', 'gram-extended', 0, 'solve: gram-extended', '#0072B2'),
-             ('solve', 'qdmd', 'qr', 0, 'solve: qr, with its pixels', '#009E73'),
-             ('engine', 'robust', 'gram', 0, 'everything: robust', '#56B4E9'),
-             ('engine', 'qdmd', 'gram', 0, 'everything: qdmd', '#999999')]
+    colours = ('#000000', '#D55E00', '#E69F00', '#CC79A7', '#0072B2', '#009E73', '#56B4E9',
+               '#999999')
     drawing, axes = panels(2, 5)
-    for axis, along, least, title in ((axes[0][0], 'width', 0, 'pixels, 60 frames'),
-                                      (axes[0][1], 'window', 50, 'frames of the window')):
-        for name, method, solver, rank, label, colour in lines:
-            points = results.growth(rows, name, along, 0, method=method, solver=solver, rank=rank)
-            slope = results.exponent([point for point in points if point[0] >= least])
-            if slope is None:
-                continue
-            axis.plot(*zip(*points), marker='o', markersize=4, color=colour,
-                      label=f'{label}: {slope:.2f}')
+    for axis, (along, title) in zip(axes[0], results.GROWS.items()):
+        for line, colour in zip(results.LINES, colours):
+            points, slope = results.growth(rows, line, along)
+            if slope is not None:
+                axis.plot(*zip(*points), marker='o', markersize=4, color=colour,
+                          label=f'{line.title}: {slope:.2f}')
         axis.set(xscale='log', yscale='log')
         finish(axis, 'fitted exponents in the legend', title, 'ms a window', loc='upper left')
     save(folder, 'growth', drawing)

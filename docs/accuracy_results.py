@@ -11,11 +11,21 @@ NUMBERS = ('rank', 'step', 'window', 'iterations', 'width', 'height', 'turns', '
            'rank_found', 'dropped')
 # Of a prediction, in both directions.
 WITHIN = 100
-# Name of the scaling part, column that grows, what it is, least value of the fit, exponent, room.
-PROMISED = (('Gram', 'width', 'time of the Gram matrix in pixels', 0, 1.0, 0.1),
-            ('Gram', 'window', 'time of the Gram matrix in the window', 100, 2.0, 0.2),
-            ('solve', 'window', 'time of the small problem (full rank) in the window', 200, 3.0,
-             0.4))
+# What grows: part, method, solver, rank, name, first window of the fit. Short windows have parts
+# that grow more slowly: whole groups of frames in the Gram matrix, squares in the small problem.
+Line = collections.namedtuple('Line', 'part method solver rank title first_window')
+GRAM = Line('Gram', 'qdmd', 'gram', 0, 'Gram matrix', 100)
+SOLVE = Line('solve', 'qdmd', 'gram', 0, 'small problem, gram, full rank', 200)
+LINES = (GRAM, SOLVE,
+         Line('solve', 'qdmd', 'gram', 1, 'small problem, gram, rank 1', 100),
+         Line('solve', 'qdmd', 'gram', 3, 'small problem, gram, rank 3', 100),
+         Line('solve', 'qdmd', 'gram-extended', 0, 'small problem, gram-extended', 100),
+         Line('solve', 'qdmd', 'qr', 0, 'small problem and its pixels, qr', 50),
+         Line('engine', 'robust', 'gram', 0, 'everything, robust', 50),
+         Line('engine', 'qdmd', 'gram', 0, 'everything, qdmd', 50))
+# Line, column that grows, exponent, room.
+PROMISED = ((GRAM, 'width', 1.0, 0.1), (GRAM, 'window', 2.0, 0.2), (SOLVE, 'window', 3.0, 0.4))
+GROWS = {'width': 'pixels', 'window': 'frames of the window'}
 
 Setting = collections.namedtuple('Setting', 'method solver rank step window iterations')
 PEERS = ('median', 'mean', 'mog2', 'knn', 'segmentation')
@@ -83,21 +93,23 @@ def exponent(points):
     return statistics.linear_regression(xs, ys).slope
 
 
-def growth(rows, name, along, least=0, **wanted):
-    """[(pixels or frames, milliseconds for a window)] of a scaling part."""
-    found = chosen(rows, part='scaling', name=name, **wanted)
-    sizes = collections.Counter((row['width'], row['height']) for row in found)
-    windows = collections.Counter(row['window'] for row in found)
-    points = []
-    for row in found:
-        if along == 'width' and row['window'] != windows.most_common(1)[0][0]:
-            continue
-        if along == 'window' and (row['width'], row['height']) != sizes.most_common(1)[0][0]:
-            continue
-        x = row['width'] * row['height'] if along == 'width' else row['window']
-        if x >= least:
-            points.append((x, row['ms'] * row['window']))
-    return sorted(points)
+def growth(rows, line, along):
+    """[(pixels or frames, milliseconds for a window)], and the exponent; None: too few."""
+    found = chosen(rows, part='scaling', name=line.part, method=line.method, solver=line.solver,
+                   rank=line.rank)
+    if not found:
+        return [], None
+    # The pixels grow at one window, the window at one size: the one that most rows have.
+    if along == 'width':
+        held = collections.Counter(row['window'] for row in found)
+        found = [row for row in found if row['window'] == held.most_common(1)[0][0]]
+        points = sorted((row['width'] * row['height'], row['ms'] * row['window'])
+                        for row in found)
+        return points, exponent(points)
+    held = collections.Counter((row['width'], row['height']) for row in found)
+    points = sorted((row['window'], row['ms'] * row['window']) for row in found
+                    if (row['width'], row['height']) == held.most_common(1)[0][0])
+    return points, exponent([point for point in points if point[0] >= line.first_window])
 
 
 def error(row):
@@ -137,13 +149,14 @@ def predictions(rows):
 def checks(rows):
     """[(what, measured, promised, yes, no or no: better)]"""
     found = []
-    for name, along, what, least, promised, room in PROMISED:
-        points = growth(rows, name, along, least, solver='gram', rank=0)
-        slope = exponent(points)
-        if slope is not None:
-            found.append((f'{what}, {points[0][0]:.0f} to {points[-1][0]:.0f}', f'{slope:.2f}',
-                          f'{promised} +- {room}',
-                          'yes' if abs(slope - promised) <= room else 'no'))
+    for line, along, promised, room in PROMISED:
+        points, slope = growth(rows, line, along)
+        if slope is None:
+            continue
+        first = line.first_window if along == 'window' else points[0][0]
+        found.append((f'exponent of time: {line.title}, {GROWS[along]} {first:.0f} to '
+                      f'{points[-1][0]:.0f}', f'{slope:.2f}', f'{promised} +- {room}',
+                      'yes' if abs(slope - promised) <= room else 'no'))
     for (family, solver), (low, high, count, within, dropped) in predictions(rows).items():
         law = 'condition^2 eps' if solver == 'gram' else 'condition eps'
         found.append((f'error of `{solver}` over {law}, {family}: medians of seeds',
