@@ -161,11 +161,13 @@ def sampling(folder, rows):
             for row in results.chosen(found, rank=rank):
                 if row['step'] > (1 if column == 'moved' else 0):
                     clips.setdefault(row['name'], {})[row['step']] = row[column]
+            if not clips:
+                continue
             for values in clips.values():
                 axis.plot(*zip(*sorted(values.items())), color=colour, alpha=0.25, linewidth=0.8)
             middle = [(step, statistics.median(values[step] for values in clips.values()))
                       for step in steps if all(step in values for values in clips.values())]
-            if clips and middle:
+            if middle:
                 axis.plot(*zip(*middle), color=colour, marker='o', markersize=4, linewidth=2,
                           label=label)
     for axis, title, y in zip(axes[0], ('how far sampling moves the background',
