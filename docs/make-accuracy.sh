@@ -31,12 +31,16 @@ if [ "$form" != --page ]; then
   [ ! -f build/build.ninja ] || again=(--reconfigure)
   meson setup "${again[@]}" build -Dtests=enabled >/dev/null
   ninja -C build tests/bench/accuracy-cost
-  if [ "$form" != --resume ]; then rm -f "$results/table.csv"; fi
+  if [ "$form" != --resume ]; then rm -f "$results/table.csv" "$results/seconds"; fi
   export GST_REGISTRY_1_0="$PWD/$results/registry.bin"
   uptime >"$results/load-before"
+  # Of all runs that the table comes from.
+  before=$(cat "$results/seconds" 2>/dev/null || echo 0)
+  trap 'echo $((before + SECONDS)) >"$results/seconds"' EXIT
   build/tests/bench/accuracy-cost "${options[@]}" "$results/table.csv"
   uptime >"$results/load-after"
-  echo "$SECONDS" >"$results/seconds"
+  echo $((before + SECONDS)) >"$results/seconds"
+  trap - EXIT
 fi
 
 /usr/bin/python3 docs/accuracy_page.py "$page" "$plots" "$results"

@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 
 #include "core/background/engine.h"
 #include "core/metrics/picture_scores.h"
@@ -19,8 +20,8 @@ namespace {
 
 using evaluation::view_of;
 
-// Frames whose backgrounds are scored, evenly spread with both ends.
-constexpr size_t kScored = 16;
+// Frames whose backgrounds are looked at, evenly spread with both ends.
+constexpr size_t kSpread = 16;
 // A window that has every clip in it.
 constexpr int kWhole = 300;
 
@@ -77,11 +78,25 @@ const char* name_of(Method method) {
   return "robust";
 }
 
-std::vector<size_t> scored_frames(size_t count) {
+using Pictures = std::map<size_t, cv::Mat>;  // by frame
+
+std::vector<size_t> spread_frames(size_t count) {
   std::vector<size_t> frames;
-  const size_t scored = std::min(kScored, count);
-  for (size_t i = 0; i < scored; ++i)
-    frames.push_back(scored > 1 ? i * (count - 1) / (scored - 1) : 0);
+  const size_t spread = std::min(kSpread, count);
+  for (size_t i = 0; i < spread; ++i)
+    frames.push_back(spread > 1 ? i * (count - 1) / (spread - 1) : 0);
+  return frames;
+}
+
+// One truth is that of one light: where it does not vary, backgrounds are scored in the middle of
+// each window, as in docs/robust.md, because those of other times may rightly have another light.
+std::vector<size_t> scored_frames(const TrueClip& clip, int window) {
+  const size_t count = clip.frames.size();
+  if (clip.truths.size() > 1) return spread_frames(count);
+  const size_t size = std::min(static_cast<size_t>(window), count);
+  std::vector<size_t> frames;
+  for (size_t first = 0; first + size <= count; first += size)
+    frames.push_back(first + (size - 1) / 2);
   return frames;
 }
 
@@ -102,10 +117,14 @@ void require(const Status& status) {
   if (!status.ok()) throw std::runtime_error(status.message);
 }
 
-// The clip through the engine; `keep`, where there is one, gets the scored backgrounds.
-void separate(const Setting& setting, const TrueClip& clip, std::vector<cv::Mat>* keep) {
+// The clip through the engine; `keep`, where there is one, gets the backgrounds that are looked at.
+void separate(const Setting& setting, const TrueClip& clip, Pictures* keep) {
   const cv::Size size = clip.frames[0].size();
-  const std::vector<size_t> wanted = scored_frames(clip.frames.size());
+  std::set<size_t> wanted;
+  if (keep) {
+    for (size_t frame : spread_frames(clip.frames.size())) wanted.insert(frame);
+    for (size_t frame : scored_frames(clip, setting.window)) wanted.insert(frame);
+  }
   Engine engine;
   require(engine.configure(engine_options(setting, clip.frames.size()), size.width, size.height));
   cv::Mat picture(size, CV_8UC3);
@@ -113,8 +132,7 @@ void separate(const Setting& setting, const TrueClip& clip, std::vector<cv::Mat>
   const auto take = [&] {
     for (; engine.ready(); ++popped) {
       engine.pop(Output::background, view_of(picture));
-      if (keep && std::binary_search(wanted.begin(), wanted.end(), popped))
-        keep->push_back(picture.clone());
+      if (wanted.contains(popped)) keep->emplace(popped, picture.clone());
     }
   };
   for (const cv::Mat& frame : clip.frames) {
@@ -125,33 +143,34 @@ void separate(const Setting& setting, const TrueClip& clip, std::vector<cv::Mat>
   take();
 }
 
-void score(const TrueClip& clip, const std::vector<cv::Mat>& pictures, Values* values) {
-  const std::vector<size_t> frames = scored_frames(clip.frames.size());
-  const auto count = static_cast<double>(pictures.size());
-  double age = 0, worst = 0, noise = 0, colour = 0;
-  for (size_t i = 0; i < pictures.size(); ++i) {
-    const ImageView truth =
-        view_of(clip.truths.size() > 1 ? clip.truths[frames[i]] : clip.truths[0]);
-    const ImageView found = view_of(static_cast<const cv::Mat&>(pictures[i]));
-    const auto luma_found = luma(found), luma_truth = luma(truth);
-    const double error = average_grey_error(luma_found, luma_truth);
-    age += error / count;
-    worst = std::max(worst, error);
-    noise += psnr(luma_found, luma_truth) / count;
-    colour += colour_quality(found, truth) / count;
+void score(const TrueClip& clip, const Pictures& pictures, int window, Values* values) {
+  const auto truth_of = [&](size_t frame) {
+    return view_of(clip.truths.size() > 1 ? clip.truths[frame] : clip.truths[0]);
+  };
+  const auto found_in = [&](size_t frame) { return view_of(pictures.at(frame)); };
+  const std::vector<size_t> frames = scored_frames(clip, window);
+  const auto count = static_cast<double>(frames.size());
+  double age = 0, noise = 0, colour = 0, worst = 0;
+  for (size_t frame : frames) {
+    const auto found = luma(found_in(frame)), truth = luma(truth_of(frame));
+    age += average_grey_error(found, truth) / count;
+    noise += psnr(found, truth) / count;
+    colour += colour_quality(found_in(frame), truth_of(frame)) / count;
   }
+  for (size_t frame : spread_frames(clip.frames.size()))
+    worst = std::max(worst, average_grey_error(luma(found_in(frame)), luma(truth_of(frame))));
   (*values)["age"] = age;
   (*values)["age_worst"] = worst;
   (*values)["psnr"] = noise;
   (*values)["cqm"] = colour;
 }
 
-// Mean absolute difference of levels, in the scored frame where it is largest.
-double distance(const std::vector<cv::Mat>& a, const std::vector<cv::Mat>& b) {
+// Mean absolute difference of levels, in the frame where it is largest.
+double distance(const Pictures& a, const Pictures& b) {
   double worst = 0;
-  for (size_t t = 0; t < a.size(); ++t)
-    worst =
-        std::max(worst, cv::norm(a[t], b[t], cv::NORM_L1) / static_cast<double>(a[t].total() * 3));
+  for (const auto& [frame, picture] : a)
+    worst = std::max(worst, cv::norm(picture, b.at(frame), cv::NORM_L1) /
+                                static_cast<double>(picture.total() * 3));
   return worst;
 }
 
@@ -159,7 +178,7 @@ double distance(const std::vector<cv::Mat>& a, const std::vector<cv::Mat>& b) {
 struct Entry {
   Point point;
   Values values;
-  std::function<std::vector<cv::Mat>()> pictures;
+  std::function<Pictures()> pictures;
   std::function<void()> work;
   std::optional<Setting> setting;
 };
@@ -184,7 +203,7 @@ Entry entry_of(const TrueClip& clip, const Setting& setting) {
           layout_of(engine_options(setting, clip.frames.size()), size.width, size.height).bytes) /
       (1 << 20);
   entry.pictures = [&clip, setting] {
-    std::vector<cv::Mat> pictures;
+    Pictures pictures;
     separate(setting, clip, &pictures);
     return pictures;
   };
@@ -199,8 +218,11 @@ Entry entry_of(const TrueClip& clip, const evaluation::Method* peer) {
                  1,         kWhole,      1,         size.width,   size.height};
   // One background for all frames.
   entry.pictures = [&clip, peer] {
-    return std::vector<cv::Mat>(std::min(kScored, clip.frames.size()),
-                                peer->separate({clip.frames}).background);
+    const cv::Mat background = peer->separate({clip.frames}).background;
+    Pictures pictures;
+    for (size_t frame : spread_frames(clip.frames.size())) pictures[frame] = background;
+    for (size_t frame : scored_frames(clip, kWhole)) pictures[frame] = background;
+    return pictures;
   };
   entry.work = [&clip, peer] { peer->separate({clip.frames}); };
   return entry;
@@ -240,7 +262,7 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
     entry.work = work;
     entry.pictures = [work] {
       work();
-      return std::vector<cv::Mat>();
+      return Pictures();
     };
     entries.push_back(entry);
   } else {
@@ -249,9 +271,9 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
   std::erase_if(entries, [&](const Entry& entry) { return table->has(entry.point); });
 
   // What sampling moves is seen beside all pixels of the same rank.
-  std::map<int, std::vector<cv::Mat>> whole;
+  std::map<int, Pictures> whole;
   for (Entry& entry : entries) {
-    std::vector<cv::Mat> pictures;
+    Pictures pictures;
     try {
       entry.values["peak_mb"] = peak_megabytes([&] { pictures = entry.pictures(); });
     } catch (const std::runtime_error& error) {
@@ -260,7 +282,7 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
       continue;
     }
     if (pictures.empty()) continue;
-    score(clip, pictures, &entry.values);
+    score(clip, pictures, entry.point.window, &entry.values);
     if (!entry.setting || entry.setting->method != Method::qdmd ||
         entry.setting->solver != Solver::gram || entry.setting->window != kWhole)
       continue;
