@@ -211,6 +211,16 @@ def machine(folder):
             'above 1 means that others used the machine.')
 
 
+def clips(rows):
+    """Which clips the table has: a run that was interrupted has fewer."""
+    lines = []
+    for scenes, title in SCENES:
+        names = dict.fromkeys(row['name'] for row in results.chosen(rows, part='quality',
+                                                                   scenes=scenes))
+        lines.append(f'- {title}, {len(names)} clips: {", ".join(names) or "none"}')
+    return '\n'.join(lines)
+
+
 def main():
     page, plots, folder = sys.argv[1:]
     rows = results.read(os.path.join(folder, 'table.csv'))
@@ -228,6 +238,7 @@ def main():
     checks = results.checks(rows)
     quality = Quality(rows)
     put('machine', machine(folder))
+    put('clips', clips(rows))
     put('wishes', quality.wishes())
     put('front', quality.front())
     put('knobs', quality.knobs())
