@@ -40,9 +40,11 @@ def finish(axis, title, x, y, legend=True, **options):
 
 def error_against_condition(folder, rows):
     families = results.families(rows)
-    drawing, axes = panels(len(families) + 1)
     shown = [(family, family) for family in families] + [('hard cases', 'tests/stability')]
-    for axis, (scenes, title) in zip(axes[0], shown):
+    drawing, axes = plt.subplots((len(shown) + 2) // 3, 3, figsize=(10, 8), layout='constrained')
+    for axis in axes.flat[len(shown):]:
+        axis.remove()
+    for axis, (scenes, title) in zip(axes.flat, shown):
         found = results.chosen(rows, part='error', scenes=scenes)
         for solver, colour in SOLVERS.items():
             points = [(row['condition'], max(LEAST, results.error(row))) for row in found

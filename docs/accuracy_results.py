@@ -122,14 +122,17 @@ def predicted(solver, condition):
 
 def families(rows):
     return list(dict.fromkeys(row['scenes'] for row in rows
-                              if row['part'] == 'error' and ' pictures' in row['scenes']))
+                              if row['part'] == 'error' and row['scenes'].startswith('family: ')))
 
 
 def predictions(rows):
     """For each family and solver: least and largest median over seeds of error over prediction,
-    windows, those within the room, and those where a solver kept fewer singular values."""
+    windows, those within the room, and those where a solver kept fewer singular values; and the
+    largest condition number of the problem over that of X."""
     result = {}
     for family in families(rows):
+        problem = max(row['sensitivity'] / row['condition']
+                      for row in chosen(rows, part='error', scenes=family))
         for solver in ('gram', 'gram-extended', 'qr'):
             by_size, within, dropped, count = collections.defaultdict(list), 0, 0, 0
             for row in chosen(rows, part='error', scenes=family, solver=solver):
@@ -142,7 +145,8 @@ def predictions(rows):
                 by_size[row['name'].partition(';')[0]].append(ratio)
             medians = [statistics.median(ratios) for ratios in by_size.values()]
             if medians:
-                result[(family, solver)] = (min(medians), max(medians), count, within, dropped)
+                result[(family, solver)] = (min(medians), max(medians), count, within, dropped,
+                                            problem)
     return result
 
 
@@ -157,11 +161,12 @@ def checks(rows):
         found.append((f'exponent of time: {line.title}, {GROWS[along]} {first:.0f} to '
                       f'{points[-1][0]:.0f}', f'{slope:.2f}', f'{promised} +- {room}',
                       'yes' if abs(slope - promised) <= room else 'no'))
-    for (family, solver), (low, high, count, within, dropped) in predictions(rows).items():
+    for (family, solver), (low, high, count, within, dropped, problem) in predictions(rows).items():
         law = 'condition^2 eps' if solver == 'gram' else 'condition eps'
-        found.append((f'error of `{solver}` over {law}, {family}: medians of seeds',
-                      f'{low:.2g} to {high:.2g} ({within} of {count} windows in the room'
-                      + (f', {dropped} with fewer singular values)' if dropped else ')'),
+        found.append((f'error of `{solver}` over {law}, {family}, whose problem has up to '
+                      f'{problem:.2g} times the condition of X',
+                      f'medians of seeds {low:.2g} to {high:.2g} ({within} of {count} windows in '
+                      'the room' + (f', {dropped} with fewer singular values)' if dropped else ')'),
                       f'1/{WITHIN} to {WITHIN}',
                       'no' if high > WITHIN else 'no: better' if low < 1 / WITHIN else 'yes'))
     return found

@@ -22,15 +22,9 @@ constexpr size_t kMostForAdjoint = 1000;
 // Pictures that hardly differ, each under a light of its own: picture k falls to 2^-k of its
 // strength from frame to frame, without rounding.
 struct Fade {
-  const char* name;
   int frames, pictures;
   int most;  // the largest level that leaves room for the sum
 };
-// The first has more frames than singular values: these come from an SVD or from a Hermitian
-// eigenproblem. The second has full rank and is a pencil of triangular matrices.
-constexpr Fade kFades[] = {{"two pictures; rank 2 of 4", 5, 2, 13},
-                           {"three pictures; full rank", 4, 3, 3}};
-
 // x_t = sum_k 2^-kt P_k, where the pictures are the same but for one level at one pixel each: the
 // more pixels there are, the less they differ in direction. All modes are there at full strength,
 // with the eigenvalues 1, 1/2, 1/4: to tell them apart takes the smallest singular value. (The
@@ -56,6 +50,53 @@ Window nearly_equal_pictures(const Fade& fade, size_t pixels, unsigned seed) {
       window.plane(slot, k)[pixels / 2] += static_cast<uint8_t>(strength(k));
   }
   return window;
+}
+
+// A light that falls to two thirds from frame to frame, over `pixels` pixels. What stays is dim: a
+// few pixels that hardly change, with the mode nearest 1. Amplitudes are fitted to the bright
+// frames as well, so that the problem's own condition number is about the square of that of X.
+Window bright_and_dim(size_t pixels, unsigned seed) {
+  constexpr size_t kDim = 4;
+  constexpr int kFrames = 4;
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> base(1, 9), level(2, 6), change(0, 2);
+  std::vector<uint8_t> light(3 * pixels), dim(3 * 2 * kDim);
+  for (auto& sample : light) sample = static_cast<uint8_t>(base(rng));
+  for (auto& sample : dim) sample = static_cast<uint8_t>(level(rng));
+  Window window(kFrames, 2 * kDim + pixels);
+  for (int strength : {27, 18, 12, 8}) {
+    const int slot = window.append();
+    for (size_t c = 0; c < kChannels; ++c) {
+      uint8_t* const plane = window.plane(slot, static_cast<int>(c));
+      // The dim pixels come first and last, where errors are looked at.
+      for (size_t p = 0; p < 2 * kDim; ++p)
+        plane[p < kDim ? p : p + pixels] =
+            static_cast<uint8_t>(dim[c * 2 * kDim + p] + change(rng));
+      for (size_t p = 0; p < pixels; ++p)
+        plane[kDim + p] = static_cast<uint8_t>(light[c * pixels + p] * strength);
+    }
+  }
+  return window;
+}
+
+// Windows whose condition number grows with the pixels.
+struct Family {
+  std::string name;
+  std::function<Window(size_t pixels, unsigned seed)> make;
+};
+
+std::vector<Family> families() {
+  const auto pictures = [](const std::string& name, const Fade& fade) {
+    return Family{"family: " + name, [fade](size_t pixels, unsigned seed) {
+                    return nearly_equal_pictures(fade, pixels, seed);
+                  }};
+  };
+  // More frames than singular values: these come from an SVD or from a Hermitian eigenproblem. At
+  // full rank there is a pencil of triangular matrices.
+  return {pictures("two pictures; rank 2 of 4", {5, 2, 13}),
+          pictures("two pictures; full rank", {3, 2, 50}),
+          pictures("three pictures; full rank", {4, 3, 3}),
+          {"family: a light goes out; full rank", bright_and_dim}};
 }
 
 void measure_case(const std::string& scenes, const HardCase& hard_case, Table* table) {
@@ -166,17 +207,15 @@ void measure_solvers(const std::string& scene, int frames, int turns, double sec
 void add_conditions(bool brief, Table* table, Steps* steps) {
   const unsigned seeds = brief ? 1 : 5;
   const size_t most = brief ? 1000 : 8000000;
-  for (const Fade& fade : kFades)
+  for (const Family& family : families())
     for (size_t pixels = 2; pixels < most; pixels *= brief ? 8 : 4)
       for (unsigned seed = 1; seed <= seeds; ++seed) {
         const std::string name = std::to_string(pixels) + " pixels; seed " + std::to_string(seed);
-        steps->push_back({"error: " + std::string(fade.name) + ", " + name, [=, &fade] {
-                            measure_case(
-                                fade.name,
-                                {name, "",
-                                 [=, &fade] { return nearly_equal_pictures(fade, pixels, seed); },
-                                 pixels > kMostForAdjoint},
-                                table);
+        steps->push_back({"error: " + family.name + ", " + name, [=] {
+                            measure_case(family.name,
+                                         {name, "", [=] { return family.make(pixels, seed); },
+                                          pixels > kMostForAdjoint},
+                                         table);
                           }});
       }
 }

@@ -6,7 +6,7 @@
 
 namespace qdmd::bench {
 
-// Windows of pictures that differ by less and less.
+// Windows whose condition number is a knob.
 void add_conditions(bool brief, Table* table, Steps* steps);
 
 // tests/stability's own.
