@@ -129,8 +129,8 @@ class Quality:
             ('nothing to think about', results.DEFAULT),
             ('the best background, and can wait', Setting('robust', 'gram', 0, 0, WHOLE, 1)),
             ('less delay and memory', Setting('robust', 'gram', 0, 0, 50, 1)),
-            ('the least time', Setting('qdmd', 'gram', 1, 8, WHOLE, 1)),
-            ('the least time at a short delay', Setting('qdmd', 'gram', 1, 1, 25, 1)),
+            ('the least time and delay', Setting('qdmd', 'gram', 1, 1, 25, 1)),
+            ('one steady background for little time', Setting('qdmd', 'gram', 1, 8, WHOLE, 1)),
             ('the paper\'s decomposition, full rank', Setting('qdmd', 'gram', 0, 1, WHOLE, 1)),
             ('its digits for nearly dependent frames',
              Setting('qdmd', 'gram-extended', 0, 1, 100, 1)),
@@ -217,7 +217,7 @@ def clips(rows):
     for scenes, title in SCENES:
         names = dict.fromkeys(row['name'] for row in results.chosen(rows, part='quality',
                                                                    scenes=scenes))
-        lines.append(f'- {title}, {len(names)} clips: {", ".join(names) or "none"}')
+        lines.append(f'- {title} ({len(names)}): {", ".join(names) or "none"}')
     return '\n'.join(lines)
 
 
