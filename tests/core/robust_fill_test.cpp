@@ -297,13 +297,18 @@ TEST(FillSamples, TakesEveryStepthPixel) {
         const size_t count = cols * static_cast<size_t>((height + step - 1) / step);
         BeforeTheEdge<uint8_t> r(count), gr(count), b(count);
         uint8_t* const out[3] = {r.data(), gr.data(), b.data()};
-        fill_samples(c.reference, bits.data(), c.x().data(), gain, step, out);
+        std::vector<uint8_t> reach(c.reference.pixels());
+        for (auto& most : reach) most = static_cast<uint8_t>(rng() % 256);
+        fill_samples(c.reference, bits.data(), c.x().data(), gain, reach.data(), step, out);
         for (size_t i = 0; i < count; ++i) {
           const size_t p = i / cols * static_cast<size_t>(step) * static_cast<size_t>(width) +
                            i % cols * static_cast<size_t>(step);
-          for (size_t k = 0; k < 3; ++k)
-            ASSERT_EQ(out[k][i], is_masked(bits.data(), p) ? c.reference.level[k][p]
-                                                           : scaled(c.frame[k][p], 1 / g));
+          for (size_t k = 0; k < 3; ++k) {
+            const int level = c.reference.level[k][p], unit = scaled(c.frame[k][p], 1 / g);
+            ASSERT_EQ(out[k][i], is_masked(bits.data(), p)
+                                     ? level
+                                     : level + std::clamp(unit - level, -int{reach[p]}, +reach[p]));
+          }
         }
       }
 }

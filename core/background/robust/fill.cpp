@@ -208,16 +208,17 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
 }
 
 void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
-                  const Gain& gain, int step, uint8_t* const out[3]) {
+                  const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
   size_t sample = 0;
   for (int row = 0; row < reference.height; row += step)
     for (int col = 0; col < reference.width; col += step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
       for (size_t c = 0; c < 3; ++c) {
-        const float unit = static_cast<float>(x[c][p]) / gain[c];
-        out[c][sample] = is_masked(bits, p) ? reference.level[c][p]
-                                            : static_cast<uint8_t>(std::min(255.0f, unit + 0.5f));
+        const int level = reference.level[c][p], limit = is_masked(bits, p) ? 0 : reach[p];
+        const auto unit =
+            static_cast<int>(std::min(255.0f, static_cast<float>(x[c][p]) / gain[c] + 0.5f));
+        out[c][sample] = static_cast<uint8_t>(std::clamp(unit, level - limit, level + limit));
       }
     }
 }

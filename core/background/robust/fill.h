@@ -51,9 +51,10 @@ class Filler {
   std::vector<uint16_t> masked_;  // snapshots, of each pixel
 };
 
-// Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked:
-// for inner products. out: ceil(width / step) * ceil(height / step) samples a channel.
+// Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,
+// drawn to that as Filler does to the median: for inner products. out: ceil(width / step) *
+// ceil(height / step) samples a channel.
 void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
-                  const Gain& gain, int step, uint8_t* const out[3]);
+                  const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]);
 
 }  // namespace qdmd

@@ -155,7 +155,8 @@ Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
     const int slot = samples_.append();
     uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                              samples_.plane(slot, 2)};
-    fill_samples(reference_, mask_.of(t), x, gains_[static_cast<size_t>(t)], step_, out);
+    fill_samples(reference_, mask_.of(t), x, gains_[static_cast<size_t>(t)], reach_.data(), step_,
+                 out);
   }
   gram_.add_newest(samples_, samples_.size());
   return decompose(samples_, gram_.matrix(samples_), options_);
@@ -165,15 +166,12 @@ Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
 void RobustSolver::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
   std::vector<Filler> fillers;
   for (size_t i = 0; i < pool_->threads(); ++i) fillers.emplace_back(snapshots.size());
-  // With several modes L(t) may follow more than the light, which drawing samples nearer would
-  // stop.
-  const uint8_t* reach = options_.rank == 1 ? reach_.data() : nullptr;
   const size_t pixels = reference_.pixels(), run = fillers[0].run();
   pool_->run((pixels + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, pixels - first);
     model->build_from(
-        fillers[worker].fill(snapshots, gains_, mask_, reference_, reach, first, count), first,
-        count);
+        fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
+        first, count);
   });
 }
 

@@ -29,10 +29,10 @@ struct RobustParameters {
 // The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
 //   start    for each region the frames that show its background (find_stable_frames), and their
 //            median: a background picture and its spread
-//   repeat   what differs from the picture is foreground and becomes background (fill_rows); Q-DMD
-//   of
-//            the filled window, of rank 1 unless another is asked for, with amplitudes fitted to
-//            all frames, is the next background
+//   repeat   what differs from the picture is foreground (find_mask) and becomes background
+//   (Filler);
+//            Q-DMD of the filled window, of rank 1 unless another is asked for, with amplitudes
+//            fitted to all frames, is the next background
 // Global changes of light are divided out before and put back in L(t). Inner products are taken
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustSolver {
