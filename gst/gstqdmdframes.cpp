@@ -65,7 +65,7 @@ static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 f
   frames->counters.frames_in += frames_in;
   frames->counters.frames_out += frames_out;
   frames->counters.solves = frames->engine.solves();
-  frames->counters.solve_period = guint(frames->engine.time_budget().period());
+  frames->counters.solve_period = guint(frames->engine.time_budget().effort().period);
   frames->counters.time_per_frame = 1000 * frames->engine.time_budget().predicted();
   frames->report = frames->engine.report();
   GST_OBJECT_UNLOCK(self);

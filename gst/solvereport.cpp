@@ -13,8 +13,9 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
       G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
       report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
       "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
-      "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame", G_TYPE_DOUBLE,
-      counters.time_per_frame, nullptr);
+      "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT,
+      guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,
+      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
   GValue lambda = G_VALUE_INIT, part = G_VALUE_INIT;
   gst_value_array_init(&lambda, 2);
   g_value_init(&part, G_TYPE_DOUBLE);
@@ -43,8 +44,9 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
       report.dmd.lambda.real(), "lambda-imaginary", G_TYPE_DOUBLE, report.dmd.lambda.imag(),
       "omega", G_TYPE_DOUBLE, report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual,
       "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio, "solve-time", G_TYPE_DOUBLE,
-      report.solve_time, "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame",
-      G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
+      report.solve_time, "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations",
+      G_TYPE_UINT, guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,
+      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
 }
 
 }  // namespace qdmd

@@ -75,7 +75,12 @@ void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel&
 }
 
 void BackgroundModel::set_time(double t) {
-  if (frozen_) return;
+  if (frozen_) {
+    weights_.assign(kIdentity.begin(), kIdentity.end());
+    if (!gains_.empty())
+      for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gains_.front()[c];
+    return;
+  }
   model_.weights(t, &time_weights_);
   if (!gains_.empty()) {
     const auto last = static_cast<double>(gains_.size() - 1);
@@ -133,6 +138,7 @@ void BackgroundModel::freeze_at(double t) {
   }
   direct_ = false;
   frozen_ = true;
+  gains_.clear();
   weights_.assign(kIdentity.begin(), kIdentity.end());
 }
 

@@ -48,7 +48,8 @@ class BackgroundModel {
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
 
-  // From now on L(t) is this L for every t, and the snapshots are no longer needed.
+  // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are
+  // no longer needed.
   void freeze_at(double t);
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.

@@ -1,10 +1,10 @@
 #include "core/background/engine.h"
 
 #include <algorithm>
-#include <chrono>
 #include <thread>
 
 #include "core/background/planes.h"
+#include "core/background/stopwatch.h"
 
 namespace qdmd {
 namespace {
@@ -23,21 +23,6 @@ int thread_count(int threads) {
   return static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1,
                                                unsigned{EngineOptions::kMaxThreads}));
 }
-
-// Adds the seconds that it lives.
-class Stopwatch {
- public:
-  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
-  ~Stopwatch() {
-    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double* seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // Calls pass(first_row, row_count) for bands of a picture's rows.
 template <typename Pass>
@@ -76,6 +61,9 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   solver_ = WindowSolver(dmd, options.iterations, layout.capacity, width, height,
                          layout.sample_step, live, pool_.get());
   live_ = LiveSolver(schedule_of(options, pixels), &solver_, side_.get());
+  const bool robust = options.dmd.method == Method::robust;
+  budget_.begin(front_of_efforts({1, robust ? options.iterations : 1, layout.sample_step}, robust,
+                                 width, height));
   alpha_ = AlphaStore(layout.capacity);
   window_ = Window(layout.capacity, pixels);
   return {};
@@ -99,7 +87,7 @@ void Engine::flush() {
   solver_.forget();
   live_.restart(false);
   pending_ = ready_ = not_in_gram_ = 0;
-  has_model_ = start_new_window_ = frozen_ = skip_solve_ = false;
+  has_model_ = start_new_window_ = frozen_ = skip_solve_ = follows_light_ = false;
   stretch_frames_ = 0;
   stretch_seconds_ = stretch_solve_ = 0;
 }
@@ -145,12 +133,21 @@ void Engine::follow_threads() {
   side_->set_active(threads > 1);
 }
 
-// The stretch before is over: its cost is known. Decides whether the next one is solved.
+// The stretch before is over: its cost is known. Decides whether the next one is solved, and how.
 void Engine::begin_stretch() {
-  budget_.add(stretch_frames_, stretch_seconds_, stretch_solve_);
+  SolveCost cost;
+  if (stretch_solve_ > 0 && !skip_solve_) {
+    // The solver knows its parts, but not what came with them. Live, frames enter the Gram matrix
+    // whether it is solved or not.
+    cost = solver_.report().cost;
+    const double gram = options_.mode == Mode::live ? solver_.report().gram_time : 0;
+    cost.once = std::max(0.0, cost.once + stretch_solve_ - cost.sum() - gram);
+  }
+  budget_.add(stretch_frames_, stretch_seconds_, cost);
   stretch_frames_ = 0;
   stretch_seconds_ = stretch_solve_ = 0;
   skip_solve_ = !budget_.next();
+  if (!skip_solve_) solver_.set_effort(budget_.effort());
 }
 
 void Engine::push_batch(const ImageView& frame) {
@@ -158,12 +155,15 @@ void Engine::push_batch(const ImageView& frame) {
   if (pending_ == 0 && has_model_ && freeze != frozen_) {
     // The model may still read its window, whose frames are about to make room. Frames that came
     // meanwhile are in no Gram matrix.
-    if (freeze)
+    if (freeze) {
+      if (!freeze_) solver_.model().set_light(kSameLight);
       solver_.model().freeze_at(window_.size() - 1);
-    else
+    } else {
       start_new_window_ = true;
+    }
     frozen_ = freeze;
   }
+  if (pending_ == 0) follows_light_ = frozen_ && !freeze_;
   if (start_new_window_) {
     side_->finish();
     window_.clear();
@@ -238,9 +238,11 @@ void Engine::push_live(const ImageView& frame) {
   solver_.append(window_);
   if (!freeze) {
     const auto solve_now = [this] {
-      // The work of the stretch is over; beside the frames, it was none of theirs.
+      // The work of the stretch is over. Beside the frames it was none of theirs, but that some
+      // waited for it.
       stretch_solve_ = live_.take_work_seconds();
-      if (side_->active() && !live_.small()) stretch_seconds_ += stretch_solve_;
+      const double wait = live_.take_wait_seconds();
+      if (side_->active() && !live_.small()) stretch_seconds_ += stretch_solve_ - wait;
       begin_stretch();
       return !skip_solve_ || !has_model_;
     };
@@ -270,6 +272,7 @@ OutputTask Engine::next_task(Output output) {
   const int index = window_.size() - pending_;
   const int slot = window_.slot(index);
   BackgroundModel& model = solver_.model();
+  if (follows_light_) solver_.follow_light(slot);
   model.set_time(options_.mode == Mode::live ? live_.time() : index);
   return {{window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
           &model,

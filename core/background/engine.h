@@ -58,8 +58,8 @@ class Engine {
   // While on, the background stays the picture that it was, and nothing is solved; only the first
   // model is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
-  // Seconds that a frame may take on average; 0: no limit. Solves become as rare as that needs, and
-  // pictures then depend on time.
+  // Seconds that a frame may take on average; 0: no limit. Solves are given the effort that fits,
+  // at most what the options say (TimeBudget), and pictures then depend on time.
   void set_time_budget(double seconds_per_frame) { budget_.set(seconds_per_frame); }
   const TimeBudget& time_budget() const { return budget_; }
   // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
@@ -101,7 +101,8 @@ class Engine {
   // Of the stretch that runs: frames, seconds in push() and pop(), of which in a solve.
   int stretch_frames_ = 0;
   double stretch_seconds_ = 0, stretch_solve_ = 0;
-  bool skip_solve_ = false;  // batch: the window that runs keeps the background
+  bool skip_solve_ = false;     // batch: the window that runs keeps the background...
+  bool follows_light_ = false;  // ...but for its light
 
   // The last member: it ends before what it works on.
   std::unique_ptr<SideThread> side_;

@@ -1,7 +1,8 @@
 #include "core/background/live_solver.h"
 
 #include <algorithm>
-#include <chrono>
+
+#include "core/background/stopwatch.h"
 
 namespace qdmd {
 
@@ -32,7 +33,10 @@ bool LiveSolver::publish() {
 bool LiveSolver::settle() {
   if (piece_due_ && schedule_.frames() + 1 < *piece_due_) return false;
   piece_due_.reset();
-  side_->finish();
+  {
+    const Stopwatch watch(&wait_seconds_);
+    side_->finish();
+  }
   return publish();
 }
 
@@ -82,9 +86,8 @@ bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange
 
 // One frame's share. Pictures come first: the solve after them needs their place.
 void LiveSolver::work() {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch(&work_seconds_);
   do_share();
-  work_seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void LiveSolver::do_share() {

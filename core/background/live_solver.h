@@ -37,6 +37,8 @@ class LiveSolver {
 
   // Seconds of work since the last call. While nothing is under way.
   double take_work_seconds() { return std::exchange(work_seconds_, 0.0); }
+  // Seconds in which settle() waited for it, since the last call.
+  double take_wait_seconds() { return std::exchange(wait_seconds_, 0.0); }
 
   // The newest frame's time in the published model.
   double time() const { return static_cast<double>(schedule_.frames() - 1 - model_start_); }
@@ -71,7 +73,7 @@ class LiveSolver {
   std::optional<Build> build_;
   std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
   std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
-  double fixed_threshold_ = 0, work_seconds_ = 0;
+  double fixed_threshold_ = 0, work_seconds_ = 0, wait_seconds_ = 0;
 };
 
 }  // namespace qdmd

@@ -1,73 +1,130 @@
 #include "core/background/time_budget.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace qdmd {
 namespace {
 
-// What the newest stretch counts against all before: a load that stays is known after two.
-constexpr double kNewest = 0.5;
-// Solves become more frequent only where they then fit into this share of the budget: an estimate
-// that wavers at its edge must not change the choice each time.
+// What the newest stretch counts against all before: for the speed of the machine, so that a load
+// that stays is known after two, and for what the parts take of it, which changes slowly.
+constexpr double kNewest = 0.5, kNewestPart = 0.25;
+// A better effort is taken only where it fits into this share of the budget: an estimate that
+// wavers at its edge must not change the choice each time.
 constexpr double kMargin = 0.85;
 // One stretch says that the machine became slower or faster by this factor at most.
 constexpr double kMostChange = 3;
+// Solves wait while more is owed than this share of a stretch's budget. More than kMostDebt
+// stretches are never owed: what a busy machine took for minutes is not paid back.
+constexpr double kLoan = 0.5, kMostDebt = 4;
+// Samples along the short side that the coarsest step leaves.
+constexpr int kFewestSamples = 30;
 
 }  // namespace
+
+std::vector<Effort> front_of_efforts(const Effort& most, bool robust, int width, int height) {
+  std::vector<Effort> front = {most};
+  if (robust) {
+    while (front.back().iterations > 1) {
+      front.push_back(front.back());
+      --front.back().iterations;
+    }
+    for (int times : {2, 4}) {
+      Effort coarser = front.back();
+      coarser.sample_step = times * most.sample_step;
+      if (std::min(width, height) / coarser.sample_step >= kFewestSamples) front.push_back(coarser);
+    }
+  }
+  // More of them would cost about the same, and the choice would waver.
+  for (int period : {2, 3, 4, 6, 8, 12, TimeBudget::kMostPeriod}) {
+    front.push_back(front.back());
+    front.back().period = period;
+  }
+  return front;
+}
+
+void TimeBudget::begin(std::vector<Effort> front) {
+  const double budget = budget_;
+  *this = TimeBudget();
+  front_ = std::move(front);
+  budget_ = budget;
+}
 
 void TimeBudget::set(double seconds_per_frame) {
   if (seconds_per_frame == budget_) return;
   budget_ = seconds_per_frame;
-  period_ = 1;
-  until_solve_ = 0;
+  chosen_ = 0;
+  since_solve_ = kMostPeriod;
+  debt_ = 0;
   choose();
 }
 
-double TimeBudget::predicted(int period) const {
-  return without_ + (with_solve_ - without_) / period;
+double TimeBudget::predicted(const Effort& effort) const {
+  const double samples = pixels_ / (static_cast<double>(effort.sample_step) * effort.sample_step);
+  const double solve = once_ + effort.iterations * (iteration_ + samples);
+  return frame_ + (frame_beside_ - frame_ + solve / frames_) / effort.period;
 }
 
 bool TimeBudget::next() {
-  if (!limited()) return true;
-  if (until_solve_ > 0) {
-    --until_solve_;
-    return false;
-  }
-  until_solve_ = period_ - 1;
-  return true;
+  const bool due = since_solve_ == 0 || since_solve_ >= kMostPeriod ||
+                   (since_solve_ >= effort().period && (!limited() || debt_ <= kLoan * allowance_));
+  if (due) since_solve_ = 0;
+  ++since_solve_;
+  given_ = effort();
+  return due;
 }
 
-void TimeBudget::add(int frames, double seconds, double solve_seconds) {
+void TimeBudget::add(int frames, double seconds, const SolveCost& solve) {
   if (frames <= 0) return;
-  const double newest = seconds / frames;
-  if (with_solve_ == 0) {
-    // The first one. A stretch that is not solved takes what is left.
-    with_solve_ = newest;
-    without_ = std::max(0.0, seconds - solve_seconds) / frames;
-  } else {
-    double& seen = solve_seconds > 0 ? with_solve_ : without_;
-    double& other = solve_seconds > 0 ? without_ : with_solve_;
-    const double before = seen;
-    seen += kNewest * (newest - seen);
-    // What slows the one down slows the other.
-    if (before > 0) other *= std::clamp(seen / before, 1 / kMostChange, kMostChange);
-    with_solve_ = std::max(with_solve_, without_);
-  }
+  const double frame = std::max(0.0, seconds - solve.sum()) / frames;
+  if (solve.sum() > 0)
+    learn_solve(frames, frame, solve);
+  else
+    learn_frame(frame);
+  frames_ = frames;
+  allowance_ = budget_ * frames;
+  debt_ = std::clamp(debt_ + seconds - allowance_, 0.0, kMostDebt * allowance_);
   choose();
 }
 
+// What slows one thing down slows everything.
+void TimeBudget::follow_speed(double expected, double seen) {
+  if (expected <= 0) return;
+  const double change = std::clamp(seen / expected, 1 / kMostChange, kMostChange);
+  for (double* part : {&frame_, &frame_beside_, &once_, &iteration_, &pixels_})
+    *part *= 1 + kNewest * (change - 1);
+}
+
+void TimeBudget::learn_solve(int frames, double frame, const SolveCost& solve) {
+  const double area = static_cast<double>(given_.sample_step) * given_.sample_step;
+  if (knows_solves_)
+    follow_speed(frame_beside_ * frames + once_ + given_.iterations * (iteration_ + pixels_ / area),
+                 frame * frames + solve.sum());
+  const double newest = knows_solves_ ? kNewestPart : 1;
+  const auto learn = [newest](double* part, double seen) { *part += newest * (seen - *part); };
+  learn(&frame_beside_, frame);
+  learn(&once_, solve.once);
+  learn(&iteration_, solve.iterations / given_.iterations);
+  learn(&pixels_, solve.samples * area / given_.iterations);
+  if (!knows_frames_) frame_ = frame_beside_;
+  knows_solves_ = true;
+}
+
+void TimeBudget::learn_frame(double frame) {
+  if (knows_frames_) follow_speed(frame_, frame);
+  frame_ += (knows_frames_ ? kNewestPart : 1) * (frame - frame_);
+  knows_frames_ = true;
+}
+
 void TimeBudget::choose() {
-  if (!limited() || with_solve_ == 0) return;
-  const auto least_period = [this](double allowed) {
-    int period = 1;
-    while (period < kMostPeriod && predicted(period) > allowed) ++period;
-    return period;
+  if (!limited() || !knows_solves_) return;
+  const auto best_within = [this](double allowed) {
+    size_t i = 0;
+    while (i + 1 < front_.size() && predicted(front_[i]) > allowed) ++i;
+    return i;
   };
-  const int needed = least_period(budget_);
-  const int comfortable = least_period(kMargin * budget_);
-  if (needed > period_) period_ = needed;
-  if (comfortable < period_) period_ = comfortable;
-  until_solve_ = std::min(until_solve_, period_ - 1);
+  chosen_ = std::max(chosen_, best_within(budget_));
+  chosen_ = std::min(chosen_, best_within(kMargin * budget_));
 }
 
 }  // namespace qdmd

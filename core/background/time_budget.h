@@ -1,39 +1,64 @@
-// How seldom a background is solved, so that a frame takes no longer than somebody asked for.
+// What effort a background is given, so that a frame takes no longer than somebody asked for.
 #pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/background/effort.h"
 
 namespace qdmd {
 
+// The efforts that are worth their time (docs/accuracy-vs-time.md), the best first: each takes less
+// time than the one before it. Fewer iterations, then fewer samples, and only then fewer solves,
+// which keep a background that ages.
+std::vector<Effort> front_of_efforts(const Effort& most, bool robust, int width, int height);
+
 // Frames come in stretches: windows in batch mode, hops in live mode. A stretch is solved, or keeps
-// the background that there is. What both take is measured; of every period() stretches one is
-// solved, as often as the budget allows. Frames, pixels and iterations stay as they are: a
-// background of the window before differs little where fewer of them would differ in each frame.
+// the background that there is. What both take is measured, and the cost model made of it says
+// which is the best effort that fits. What a stretch took too much is paid back: the next solve
+// waits.
 class TimeBudget {
  public:
   // More seldom than once in so many stretches makes hardly anything cheaper.
   static constexpr int kMostPeriod = 16;
 
-  // Seconds that a frame may take; 0: every stretch is solved. Estimates are kept.
+  // Starts afresh. front: not empty, the best first.
+  void begin(std::vector<Effort> front);
+  // Seconds that a frame may take; 0: no limit, each stretch has the best effort. What was
+  // measured is kept.
   void set(double seconds_per_frame);
   bool limited() const { return budget_ > 0; }
 
   // Called once before each stretch: is it solved?
   bool next();
-  // What the stretch took in all, and what of it a solve did (0: it was not solved).
-  void add(int frames, double seconds, double solve_seconds);
+  // What that stretch took in all, and, where it was solved, what its solve took of it.
+  void add(int frames, double seconds, const SolveCost& solve);
 
-  int period() const { return period_; }
-  // The cost model: seconds for each frame where one of `period` stretches is solved; 0 as long as
-  // nothing was measured.
-  double predicted(int period) const;
-  double predicted() const { return predicted(period_); }
+  // Of the stretches from now on.
+  const Effort& effort() const { return front_[chosen_]; }
+  // The cost model: seconds for each frame with that effort; 0 as long as nothing was measured.
+  double predicted(const Effort& effort) const;
+  double predicted() const { return predicted(effort()); }
 
  private:
+  void follow_speed(double expected, double seen);
+  void learn_solve(int frames, double frame, const SolveCost& solve);
+  void learn_frame(double frame);
   void choose();
 
+  std::vector<Effort> front_ = {Effort()};
+  size_t chosen_ = 0;
   double budget_ = 0;
-  double with_solve_ = 0, without_ = 0;  // seconds for each frame of such stretches
-  int period_ = 1;
-  int until_solve_ = 0;  // stretches before the next that is solved
+  // The cost model, in seconds: a frame of a stretch without a solve, one of a stretch with it (in
+  // live mode they share the processor), and of a solve what it takes once, for each iteration, and
+  // for the samples of an iteration if it saw all pixels.
+  double frame_ = 0, frame_beside_ = 0, once_ = 0, iteration_ = 0, pixels_ = 0;
+  bool knows_solves_ = false, knows_frames_ = false;
+  int frames_ = 1;       // of the newest stretch
+  Effort given_;         // to it
+  int since_solve_ = 0;  // stretches since the newest that was solved, that one included
+  // Seconds taken above the budget, and the budget of the newest stretch.
+  double debt_ = 0, allowance_ = 0;
 };
 
 }  // namespace qdmd

@@ -1,7 +1,6 @@
 #include "core/background/window_solver.h"
 
-#include <chrono>
-
+#include "core/background/stopwatch.h"
 #include "core/dmd/decompose.h"
 
 namespace qdmd {
@@ -9,10 +8,6 @@ namespace {
 
 // Pixels whose share of a pass is worth waking a thread for.
 constexpr size_t kPixelsPerPart = 16384;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 size_t sampled(int size, int step) { return static_cast<size_t>((size + step - 1) / step); }
 
@@ -37,6 +32,7 @@ WindowSolver::WindowSolver(const DmdOptions& options, int iterations, int capaci
       width_(width),
       height_(height),
       sample_step_(sample_step),
+      iterations_(iterations),
       keep_pictures_(keep_pictures),
       pool_(pool) {
   if (robust()) {
@@ -71,17 +67,16 @@ void WindowSolver::append(const Window& window) {
 
 void WindowSolver::add_to_gram(const SnapshotRange& span, int frames, int index, int count) {
   if (robust()) return;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch(&gram_seconds_);
   const SnapshotRange columns = sample_step_ > 1 ? span.in(samples_) : span;
   const size_t first = slice_start(columns.plane_size(), index, count);
   gram_.add_slice(columns, frames, first,
                   slice_start(columns.plane_size(), index + 1, count) - first);
-  gram_seconds_ += seconds_since(start);
 }
 
 void WindowSolver::decompose(const SnapshotRange& snapshots) {
-  const auto start = std::chrono::steady_clock::now();
   decomposed_ = SolveReport();
+  const Stopwatch watch(&decomposed_.solve_time);
   if (!robust()) {
     const SnapshotRange columns = sample_step_ > 1 ? snapshots.in(samples_) : snapshots;
     Decomposition decomposition = qdmd::decompose(columns, gram_.matrix(columns), options_);
@@ -90,21 +85,21 @@ void WindowSolver::decompose(const SnapshotRange& snapshots) {
   }
   decomposed_.window_frames = snapshots.size();
   decomposed_.sample_step = sample_step_;
+  decomposed_.iterations = robust() ? iterations_ : 1;
   decomposed_.gram_time = gram_seconds_;
   gram_seconds_ = 0;
   snapshots_ = snapshots;
   fresh_ = std::min(1.0f, static_cast<float>(appended_) / static_cast<float>(snapshots.size()));
   appended_ = 0;
-  decomposed_.solve_time = seconds_since(start);
 }
 
 void WindowSolver::build(int index, int count) {
   if (index == 0) {
     next_report_ = decomposed_;
     if (robust()) {
-      const auto start = std::chrono::steady_clock::now();
       next_report_.dmd = robust_.solve(*snapshots_, fresh_, &models_[next()]);
-      next_report_.solve_time = seconds_since(start);
+      next_report_.cost = robust_.cost();
+      next_report_.solve_time = next_report_.cost.sum();
     } else {
       models_[next()].begin(*snapshots_, background_, keep_pictures_);
     }
@@ -123,6 +118,13 @@ void WindowSolver::build(int index, int count) {
 
 void WindowSolver::finish(double fixed_threshold) {
   next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], fixed_threshold);
+}
+
+void WindowSolver::set_effort(const Effort& effort) {
+  if (!robust()) return;
+  sample_step_ = effort.sample_step;
+  iterations_ = effort.iterations;
+  robust_.set_effort(effort.iterations, effort.sample_step);
 }
 
 void WindowSolver::follow_light(int slot) {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/background/background_model.h"
+#include "core/background/effort.h"
 #include "core/background/foreground.h"
 #include "core/background/robust/robust_solver.h"
 #include "core/dmd/options.h"
@@ -17,9 +18,11 @@ struct SolveReport {
   ForegroundStatistics foreground;
   int window_frames = 0;
   int sample_step = 1;  // the decomposition saw every k-th pixel in x and y
+  int iterations = 1;
   // Seconds in the Gram matrix since the solve before, and in the decomposition, which for
   // Method::robust has all of it.
   double gram_time = 0, solve_time = 0;
+  SolveCost cost;  // of Method::robust: its parts
 };
 
 // The steps of a solve: add_to_gram() for groups of frames, each in slices of pixels; decompose();
@@ -57,6 +60,10 @@ class WindowSolver {
   void finish(double fixed_threshold);
   void publish();
 
+  // Of the solves to come, where the method is robust: at most the iterations and samples that it
+  // was made for. While no solve is under way.
+  void set_effort(const Effort& effort);
+
   // Sets the model to the light of the frame in `slot` of the window, where the method follows
   // light.
   void follow_light(int slot);
@@ -72,7 +79,7 @@ class WindowSolver {
   bool robust() const { return options_.method == Method::robust; }
 
   DmdOptions options_;
-  int width_ = 0, height_ = 0, sample_step_ = 1;
+  int width_ = 0, height_ = 0, sample_step_ = 1, iterations_ = 1;
   bool keep_pictures_ = false;
   Pool* pool_ = nullptr;
   Window samples_;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <opencv2/core/utility.hpp>
 
+#include "tests/bench/accuracy_budget.h"
 #include "tests/bench/accuracy_error.h"
 #include "tests/bench/accuracy_quality.h"
 #include "tests/bench/accuracy_scaling.h"
@@ -61,13 +62,13 @@ int main(int argc, char** argv) try {
       "Measures time, numerical error, background quality and memory of every setting, on one "
       "thread, and writes them as CSV. Rows that the file has are not measured again.");
   std::string csv;
-  std::vector<std::string> parts = {"error", "scaling", "quality"};
+  std::vector<std::string> parts = {"budget", "error", "scaling", "quality"};
   QualityLimits limits;
   const char* data = std::getenv("QDMD_DATA");
   app.add_option("csv", csv, "file that is written, or continued")->required();
   app.add_option("--parts", parts, "what is measured")
       ->delimiter(',')
-      ->check(CLI::IsMember({"error", "scaling", "quality"}));
+      ->check(CLI::IsMember({"budget", "error", "scaling", "quality"}));
   app.add_option("--turns", limits.turns, "times that everything is measured, for medians")
       ->check(CLI::Range(1, 100));
   app.add_option("--seconds", limits.seconds,
@@ -83,7 +84,9 @@ int main(int argc, char** argv) try {
   Steps steps;
   const int more_turns = 2 * limits.turns + 1;
   for (const std::string& part : parts) {
-    if (part == "error") {
+    if (part == "budget") {
+      add_budgets(limits.brief, &table, &steps);
+    } else if (part == "error") {
       add_conditions(limits.brief, &table, &steps);
       add_hard_cases(limits.brief, &table, &steps);
       add_solvers(limits.brief, more_turns, limits.seconds, &table, &steps);

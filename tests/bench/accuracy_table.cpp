@@ -34,7 +34,15 @@ const std::vector<std::string> kValueColumns = {"turns",
                                                 "lambda_error",
                                                 "background_error",
                                                 "rank_found",
-                                                "dropped"};
+                                                "dropped",
+                                                "budget_ms",
+                                                "before_ms",
+                                                "first_ms",
+                                                "after_ms",
+                                                "found_period",
+                                                "found_step",
+                                                "found_iterations",
+                                                "changes"};
 
 std::string head() {
   std::string text = kPointColumns;
@@ -106,8 +114,8 @@ void Table::add(const Point& point, const Values& values) {
 void Times::put(Values* values) const {
   (*values)["turns"] = static_cast<double>(processor.size());
   (*values)["ms"] = median(processor);
-  (*values)["ms_low"] = quantile(processor, 0.25);
-  (*values)["ms_high"] = quantile(processor, 0.75);
+  (*values)["ms_low"] = quantile(processor, 0);
+  (*values)["ms_high"] = quantile(processor, 1);
   (*values)["clock_ms"] = median(clock);
 }
 

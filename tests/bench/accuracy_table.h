@@ -12,7 +12,7 @@ namespace qdmd::bench {
 
 // What is measured. Texts have no commas and no quotes.
 struct Point {
-  std::string part;    // quality, error, scaling
+  std::string part;    // quality, error, scaling, budget
   std::string scenes;  // in which family of cases
   std::string name;    // the case
   std::string method, solver;
@@ -47,7 +47,7 @@ class Table {
 struct Times {
   std::vector<double> processor, clock;
 
-  // ms, ms_low, ms_high (quartiles), clock_ms, turns.
+  // ms (the median), ms_low and ms_high (the least and the largest), clock_ms, turns.
   void put(Values* values) const;
 };
 

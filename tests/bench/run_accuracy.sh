@@ -5,7 +5,7 @@ set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$1" --short "$folder/table.csv"
-for part in error scaling quality; do grep -q "^$part," "$folder/table.csv"; done
+for part in budget error scaling quality; do grep -q "^$part," "$folder/table.csv"; done
 sort "$folder/table.csv" | cut -d, -f1-11 >"$folder/rows"
 truncate -s -3 "$folder/table.csv"
 "$1" --short "$folder/table.csv" 2>"$folder/log" || { cat "$folder/log"; exit 1; }

@@ -4,16 +4,20 @@
 #include <cmath>
 
 #include "core/background/robust/median_picture.h"
+#include "core/background/stopwatch.h"
 
 namespace qdmd {
 namespace {
 
-int sampled(int size, int step) { return (size + step - 1) / step; }
+size_t sampled(int width, int height, int step) {
+  const auto along = [step](int size) { return static_cast<size_t>((size + step - 1) / step); };
+  return along(width) * along(height);
+}
 
 }  // namespace
 
 int RobustSolver::chosen_step(int width, int height) {
-  return std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0)));
+  return std::max(1, static_cast<int>(std::lround(std::min(width, height) / 60.0)));
 }
 
 uint64_t RobustSolver::bytes(int capacity, int width, int height, int sample_step) {
@@ -28,9 +32,8 @@ uint64_t RobustSolver::bytes(int capacity, int width, int height, int sample_ste
       cells * sizeof(float) * (2 * kChannels * frames + (kChannels + 2) * looks);
   // The reference and what an earlier window left: levels, spread, threshold, reach.
   const uint64_t of_pictures = pixels * (2 * kChannels + 4);
-  const auto cols = static_cast<size_t>(sampled(width, sample_step));
   return of_cells + of_pictures + WindowMask::bytes(capacity, static_cast<size_t>(pixels)) +
-         Window::bytes(capacity, cols * static_cast<size_t>(sampled(height, sample_step)));
+         Window::bytes(capacity, sampled(width, height, sample_step));
 }
 
 RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample_step, int capacity,
@@ -45,8 +48,7 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
       background_cells_(grid_, 2),
       earlier_(grid_),
       mask_(capacity, static_cast<size_t>(width) * static_cast<size_t>(height)),
-      samples_(capacity, static_cast<size_t>(sampled(width, sample_step)) *
-                             static_cast<size_t>(sampled(height, sample_step))),
+      samples_(capacity, sampled(width, height, sample_step)),
       gram_(capacity, pool) {
   // What the paper fits to the first frame depends on what stood there.
   options_.amplitude = Amplitude::window;
@@ -54,6 +56,16 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
   if (options_.rank == 0) options_.rank = 1;
   reference_.width = width;
   reference_.height = height;
+}
+
+void RobustSolver::set_effort(int iterations, int sample_step) {
+  iterations_ = iterations;
+  if (sample_step == step_) return;
+  step_ = sample_step;
+  const int capacity = samples_.capacity();
+  // The old samples go first: two sets at once would break the promise of max-memory.
+  samples_ = Window();
+  samples_ = Window(capacity, sampled(grid_.width, grid_.height, step_));
 }
 
 void RobustSolver::append(const Window& window, int slot) {
@@ -148,17 +160,20 @@ void RobustSolver::find_foreground(const SnapshotRange& snapshots) {
 }
 
 Decomposition RobustSolver::decompose_filled(const SnapshotRange& snapshots) {
-  samples_.clear();
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                 snapshots.plane(t, 2)};
-    const int slot = samples_.append();
-    uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
-                             samples_.plane(slot, 2)};
-    fill_samples(reference_, mask_.of(t), x, gains_[static_cast<size_t>(t)], reach_.data(), step_,
-                 out);
+  {
+    const Stopwatch watch(&cost_.samples);
+    samples_.clear();
+    while (samples_.size() < snapshots.size()) samples_.append();
+    pool_->run(static_cast<size_t>(snapshots.size()), [&](size_t part) {
+      const int t = static_cast<int>(part), slot = samples_.slot(t);
+      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                   snapshots.plane(t, 2)};
+      uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
+                               samples_.plane(slot, 2)};
+      fill_samples(reference_, mask_.of(t), x, gains_[part], reach_.data(), step_, out);
+    });
+    gram_.add_newest(samples_, samples_.size());
   }
-  gram_.add_newest(samples_, samples_.size());
   return decompose(samples_, gram_.matrix(samples_), options_);
 }
 
@@ -186,27 +201,46 @@ void RobustSolver::take_reference(BackgroundModel* model, double t) {
   }
 }
 
+// The light of the frames by sampled pixels.
+void RobustSolver::refine_light(const SnapshotRange& snapshots) {
+  if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
+  const Stopwatch watch(&cost_.samples);
+  pool_->run(gains_.size(), [&](size_t part) {
+    const int t = static_cast<int>(part);
+    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                 snapshots.plane(t, 2)};
+    gains_[part] = refine_gain(reference_, x, gains_[part], step_);
+  });
+  settle_light(&gains_);
+}
+
 DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, float fresh,
                                BackgroundModel* model) {
-  start(snapshots);
+  cost_ = SolveCost();
+  double all = 0, iterations = 0;
   DmdSummary summary;
-  for (int iteration = 0; iteration < iterations_; ++iteration) {
-    if (std::any_of(gains_.begin(), gains_.end(), is_lit)) {
-      pool_->run(gains_.size(), [&](size_t part) {
-        const int t = static_cast<int>(part);
-        const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                     snapshots.plane(t, 2)};
-        gains_[part] = refine_gain(reference_, x, gains_[part], step_);
-      });
-      settle_light(&gains_);
+  {
+    const Stopwatch watch(&all);
+    start(snapshots);
+    for (int iteration = 0; iteration < iterations_; ++iteration) {
+      const Stopwatch one(&iterations);
+      refine_light(snapshots);
+      find_foreground(snapshots);
+      const Decomposition decomposition = decompose_filled(snapshots);
+      summary = decomposition.summary;
+      model->begin(snapshots, decomposition.background, true);
+      combine(snapshots, model);
+      take_reference(model, snapshots.size() / 2);
     }
-    find_foreground(snapshots);
-    const Decomposition decomposition = decompose_filled(snapshots);
-    summary = decomposition.summary;
-    model->begin(snapshots, decomposition.background, true);
-    combine(snapshots, model);
-    take_reference(model, snapshots.size() / 2);
+    end(fresh, model);
   }
+  cost_.once = all - iterations;
+  cost_.iterations = iterations - cost_.samples;
+  return summary;
+}
+
+// What others ask the model, and what later windows are told.
+void RobustSolver::end(float fresh, BackgroundModel* model) {
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
                background_cells_.plane(1 - published_, c));
@@ -219,7 +253,6 @@ DmdSummary RobustSolver::solve(const SnapshotRange& snapshots, float fresh,
       reference_.threshold.begin(), reference_.threshold.end(), limits.begin(),
       [](int threshold) { return static_cast<uint8_t>(std::min(255, 3 * threshold / 2)); });
   model->set_limits(std::move(limits));
-  return summary;
 }
 
 }  // namespace qdmd

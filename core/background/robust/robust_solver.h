@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/background/background_model.h"
+#include "core/background/effort.h"
 #include "core/background/robust/earlier.h"
 #include "core/background/robust/fill.h"
 #include "core/background/robust/stable_frames.h"
@@ -45,7 +46,8 @@ class RobustSolver {
   // Bytes beside the window: cells, masks, samples, pictures, and what a start compares.
   static uint64_t bytes(int capacity, int width, int height, int sample_step);
 
-  // The step that leaves about 120 samples along the short side.
+  // The step that leaves about 60 samples along the short side: more move no background
+  // (docs/robust.md).
   static int chosen_step(int width, int height);
 
   // Takes in the frame in `slot` of `window`.
@@ -56,21 +58,28 @@ class RobustSolver {
   void publish() { published_ = 1 - published_; }
   // Forgets what earlier windows showed.
   void forget() { earlier_.forget(); }
+  // Of the solves to come: at most as many samples as it was made for. Throws std::bad_alloc.
+  void set_effort(int iterations, int sample_step);
   // Makes `model` the window's background. fresh: the share of the snapshots that no solve before
   // had.
   DmdSummary solve(const SnapshotRange& snapshots, float fresh, BackgroundModel* model);
+  // What the newest solve took.
+  const SolveCost& cost() const { return cost_; }
 
  private:
   void start(const SnapshotRange& snapshots);
+  void refine_light(const SnapshotRange& snapshots);
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
   void combine(const SnapshotRange& snapshots, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
+  void end(float fresh, BackgroundModel* model);
 
   DmdOptions options_;
   RobustParameters parameters_;
   int iterations_ = 1, step_ = 1;
+  SolveCost cost_;
   Pool* pool_ = nullptr;
   Grid grid_;
   GridFrames cells_;             // by slot
