@@ -52,7 +52,7 @@ class Quality:
     def head(self):
         cells = []
         for _, title in self.shown:
-            cells += [f'{title}: AGE', 'PSNR, dB', 'CQM, dB', 'ms a frame', 'quartiles']
+            cells += [f'{title}: AGE', 'PSNR, dB', 'CQM, dB', 'ms a frame', 'spread']
         return cells + ['peak, MB']
 
     def cells(self, setting):
@@ -195,6 +195,20 @@ def growth_table(rows):
                   'ms a window (frames)'], lines)
 
 
+def budget_table(rows):
+    lines = []
+    for scene, mode, loaded, of_budget in results.budgets(rows):
+        for row in of_budget:
+            budget = f'{row["budget_ms"]:.0f} ms' if row['budget_ms'] else 'none'
+            means = [row['before_ms'], row['first_ms'], row['after_ms']] if loaded else [row['ms']]
+            lines.append([f'{mode}, {scene}', 'from half-way on' if loaded else 'none', budget,
+                          ' / '.join(figure(mean) for mean in means), f'{row["age"]:.2f}',
+                          f'{row["found_period"]:.0f}', f'{row["found_step"]:.0f}',
+                          f'{row["changes"]:.0f}'])
+    return table(['mode, scene', 'load', 'budget', 'ms a frame', 'AGE', 'one solve in',
+                  'sample step', 'changes'], lines)
+
+
 def machine(folder):
     def text(name):
         with open(os.path.join(folder, name)) as file:
@@ -248,6 +262,7 @@ def main():
                         [[*check[:3], '**no**' if check[3] == 'no' else check[3]] for check in checks]))
     put('solvers', solvers_table(rows))
     put('growth', growth_table(rows))
+    put('budget', budget_table(rows))
     with open(page, 'w') as file:
         file.write(text)
     accuracy_plots.draw(plots, rows)

@@ -7,6 +7,7 @@ import matplotlib
 
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt
+from matplotlib.ticker import LogLocator, NullFormatter
 
 import accuracy_results as results
 
@@ -40,26 +41,33 @@ def finish(axis, title, x, y, legend=True, **options):
 
 def error_against_condition(folder, rows):
     families = results.families(rows)
-    shown = [(family, family) for family in families] + [('hard cases', 'tests/stability')]
+    shown = [(family, family, 'condition') for family in families]
+    # Where the problem itself is worse than X, that is what decides.
+    shown += [(family, family, 'sensitivity') for family in families
+              if results.problem_condition(rows, family) > results.WITHIN]
+    shown.append(('hard cases', 'tests/stability', 'condition'))
     drawing, axes = plt.subplots((len(shown) + 2) // 3, 3, figsize=(10, 8), layout='constrained')
     for axis in axes.flat[len(shown):]:
         axis.remove()
-    for axis, (scenes, title) in zip(axes.flat, shown):
+    for axis, (scenes, title, along) in zip(axes.flat, shown):
         found = results.chosen(rows, part='error', scenes=scenes)
         for solver, colour in SOLVERS.items():
-            points = [(row['condition'], max(LEAST, results.error(row))) for row in found
+            points = [(row[along], max(LEAST, results.error(row))) for row in found
                       if row['solver'] == solver and math.isfinite(results.error(row))]
             if points:
                 axis.plot(*zip(*points), linestyle='none', marker='o', markersize=3, alpha=0.6,
                           color=colour, label=solver)
-        ends = (1, 1e7)
-        for solver, style, label in (('gram', '--', 'condition$^2$ eps'),
-                                     ('gram-extended', '-', 'condition eps')):
+        of_x = along == 'condition'
+        ends = (1, 1e7 if of_x else 1e11)
+        lines = [('gram-extended', '-', 'condition eps')]
+        if of_x:
+            lines.insert(0, ('gram', '--', 'condition$^2$ eps'))
+        for solver, style, label in lines:
             axis.plot(ends, [results.predicted(solver, end) for end in ends], style, color='black',
                       linewidth=1, label=label)
         axis.set(xscale='log', yscale='log', xlim=ends, ylim=(LEAST / 2, 10))
-        finish(axis, title, 'condition number of X', 'relative error, against 50 digits',
-               legend=scenes == shown[0][0], loc='upper left')
+        finish(axis, title, 'condition number of X' if of_x else 'of the problem itself',
+               'relative error, against 50 digits', legend=axis is axes.flat[0], loc='upper left')
     save(folder, 'error-condition', drawing)
 
 
@@ -133,6 +141,9 @@ def quality_against_time(folder, rows):
             axis.plot([values['ms']], [values['age']], marker='o', markersize=11, color='black',
                       markerfacecolor='none', linestyle='none', label='defaults')
         axis.set(xscale='log', yscale='log')
+        axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.yaxis.set_major_formatter('{x:g}')
+        axis.yaxis.set_minor_formatter(NullFormatter())
         finish(axis, title, 'ms a frame', 'AGE, mean over the clips', loc='best')
     save(folder, 'quality-time', drawing)
 

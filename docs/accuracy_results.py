@@ -8,7 +8,10 @@ EPSILON = 2.0 ** -52
 NUMBERS = ('rank', 'step', 'window', 'iterations', 'width', 'height', 'turns', 'ms', 'ms_low',
            'ms_high', 'clock_ms', 'layout_mb', 'peak_mb', 'age', 'age_worst', 'psnr', 'cqm',
            'moved', 'condition', 'movement', 'sensitivity', 'lambda_error', 'background_error',
-           'rank_found', 'dropped')
+           'rank_found', 'dropped', 'budget_ms', 'before_ms', 'first_ms', 'after_ms', 'found_period',
+           'found_step', 'found_iterations', 'changes')
+# Of a budget, that a mean may be above it.
+OVER_BUDGET = 1.2
 # Of a prediction, in both directions.
 WITHIN = 100
 # What grows: part, method, solver, rank, name, first window of the fit. Short windows have parts
@@ -125,29 +128,82 @@ def families(rows):
                               if row['part'] == 'error' and row['scenes'].startswith('family: ')))
 
 
-def predictions(rows):
-    """For each family and solver: least and largest median over seeds of error over prediction,
-    windows, those within the room, and those where a solver kept fewer singular values; and the
-    largest condition number of the problem over that of X."""
-    result = {}
+def problem_condition(rows, family):
+    """Of the family: the largest condition number of the problem over that of X."""
+    return max(row['sensitivity'] / row['condition']
+               for row in chosen(rows, part='error', scenes=family))
+
+
+def prediction(rows, family, solver, expected):
+    """Least and largest median over seeds of error over expected(row), windows, those within the
+    room, and those where the solver kept fewer singular values; None: there is no such row."""
+    by_size, within, dropped, count = collections.defaultdict(list), 0, 0, 0
+    for row in chosen(rows, part='error', scenes=family, solver=solver):
+        count += 1
+        if row['dropped'] > 0:
+            dropped += 1
+            continue
+        ratio = error(row) / expected(row)
+        within += 1 / WITHIN <= ratio <= WITHIN
+        by_size[row['name'].partition(';')[0]].append(ratio)
+    medians = [statistics.median(ratios) for ratios in by_size.values()]
+    return (min(medians), max(medians), count, within, dropped) if medians else None
+
+
+def error_checks(rows):
+    found = []
     for family in families(rows):
-        problem = max(row['sensitivity'] / row['condition']
-                      for row in chosen(rows, part='error', scenes=family))
-        for solver in ('gram', 'gram-extended', 'qr'):
-            by_size, within, dropped, count = collections.defaultdict(list), 0, 0, 0
-            for row in chosen(rows, part='error', scenes=family, solver=solver):
-                count += 1
-                if row['dropped'] > 0:
-                    dropped += 1
-                    continue
-                ratio = error(row) / predicted(solver, row['condition'])
-                within += 1 / WITHIN <= ratio <= WITHIN
-                by_size[row['name'].partition(';')[0]].append(ratio)
-            medians = [statistics.median(ratios) for ratios in by_size.values()]
-            if medians:
-                result[(family, solver)] = (min(medians), max(medians), count, within, dropped,
-                                            problem)
-    return result
+        problem = problem_condition(rows, family)
+        laws = [(solver, 'condition^2 eps' if solver == 'gram' else 'condition eps',
+                 lambda row, solver=solver: predicted(solver, row['condition']))
+                for solver in ('gram', 'gram-extended', 'qr')]
+        if problem > WITHIN:
+            laws += [(solver, 'eps times the problem\'s own condition',
+                      lambda row: row['sensitivity'] * EPSILON)
+                     for solver in ('gram-extended', 'qr')]
+        for solver, law, expected in laws:
+            ratios = prediction(rows, family, solver, expected)
+            if ratios is None:
+                continue
+            low, high, count, within, dropped = ratios
+            found.append((f'error of `{solver}` over {law}, {family}, whose problem has up to '
+                          f'{problem:.2g} times the condition of X',
+                          f'medians of seeds {low:.2g} to {high:.2g} ({within} of {count} windows '
+                          'in the room' +
+                          (f', {dropped} with fewer singular values)' if dropped else ')'),
+                          f'1/{WITHIN} to {WITHIN}',
+                          'no' if high > WITHIN else 'no: better' if low < 1 / WITHIN else 'yes'))
+    return found
+
+
+def budgets(rows):
+    """[(scene, mode, under load, [rows by budget, the one without limit last])]"""
+    groups = collections.defaultdict(list)
+    for row in chosen(rows, part='budget'):
+        mode, _, load = row['scenes'].partition('; ')
+        groups[(row['name'].partition(';')[0], mode, bool(load))].append(row)
+    return [(*key, sorted(found, key=lambda row: row['budget_ms'] or math.inf))
+            for key, found in groups.items()]
+
+
+def budget_checks(rows):
+    found = []
+    for scene, mode, loaded, of_budget in budgets(rows):
+        limited = [row for row in of_budget if row['budget_ms'] > 0]
+        for row in limited:
+            # Under load, two windows are left for it to be noticed.
+            mean = row['after_ms'] if loaded else row['ms']
+            budget = row['budget_ms']
+            found.append((f'`time-budget={budget:.0f}`, {mode}, {scene}' +
+                          (', from the third window under load on' if loaded else ''),
+                          f'{mean:.2f} ms a frame', f'at most {OVER_BUDGET * budget:.1f}',
+                          'yes' if mean <= OVER_BUDGET * budget else 'no'))
+        if not loaded:
+            ages = [row['age'] for row in limited]
+            found.append((f'a larger budget is no worse, {mode}, {scene}',
+                          'AGE ' + ', '.join(f'{age:.2f}' for age in ages), 'falling',
+                          'yes' if all(b <= a + 0.01 for a, b in zip(ages, ages[1:])) else 'no'))
+    return found
 
 
 def checks(rows):
@@ -161,12 +217,4 @@ def checks(rows):
         found.append((f'exponent of time: {line.title}, {GROWS[along]} {first:.0f} to '
                       f'{points[-1][0]:.0f}', f'{slope:.2f}', f'{promised} +- {room}',
                       'yes' if abs(slope - promised) <= room else 'no'))
-    for (family, solver), (low, high, count, within, dropped, problem) in predictions(rows).items():
-        law = 'condition^2 eps' if solver == 'gram' else 'condition eps'
-        found.append((f'error of `{solver}` over {law}, {family}, whose problem has up to '
-                      f'{problem:.2g} times the condition of X',
-                      f'medians of seeds {low:.2g} to {high:.2g} ({within} of {count} windows in '
-                      'the room' + (f', {dropped} with fewer singular values)' if dropped else ')'),
-                      f'1/{WITHIN} to {WITHIN}',
-                      'no' if high > WITHIN else 'no: better' if low < 1 / WITHIN else 'yes'))
-    return found
+    return found + error_checks(rows) + budget_checks(rows)

@@ -66,7 +66,7 @@ if [ -f "$video" ]; then
   mkdir -p "$street/input"
   gst-launch-1.0 -q filesrc location="$video" ! decodebin ! videoconvert ! videorate ! \
     video/x-raw,framerate=5/2 ! jpegenc quality=95 ! multifilesink location="$street/input/%06d.jpg"
-  build/tests/evaluation/qdmd-evaluate --dataset "$street" --methods qdmd,median,mog2 \
+  build/tests/evaluation/qdmd-evaluate --dataset "$street" --methods robust,qdmd,median,mog2 \
     --output-dir "$street/out" >/dev/null || [ -f "$street/out/street_sheet.png" ]
   gst-launch-1.0 -q filesrc location="$street/out/street_sheet.png" ! pngdec ! videoconvert ! \
     videoscale method=lanczos ! video/x-raw,width=1200,pixel-aspect-ratio=1/1 ! \

@@ -264,8 +264,9 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       g_param_spec_boxed("stats", "Statistics",
                          "Counters, and facts about the newest solve: rank, lambda (real and "
                          "imaginary part), omega in rad/frame, residual, condition, "
-                         "foreground-ratio (0 to 1), gram-time and solve-time in seconds, "
-                         "solve-period and time-per-frame (ms) of the time budget",
+                         "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
+                         "what it was given: sample-step, iterations, solve-period (of so many "
+                         "windows or hops one is solved); time-per-frame (ms), as measured",
                          GST_TYPE_STRUCTURE,
                          GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   g_object_class_install_property(

@@ -98,7 +98,7 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("sample-step", "Sample step",
                                 "The decomposition sees every k-th pixel in x and y; the output "
-                                "stays full size (0: all pixels for qdmd and dmd, about 120 along "
+                                "stays full size (0: all pixels for qdmd and dmd, about 60 along "
                                 "the short side for robust)",
                                 0, guint(EngineOptions::kMaxSampleStep),
                                 guint(d.engine.sample_step), kAtStart);

@@ -9,9 +9,13 @@ namespace {
 // What the newest stretch counts against all before: for the speed of the machine, so that a load
 // that stays is known after two, and for what the parts take of it, which changes slowly.
 constexpr double kNewest = 0.5, kNewestPart = 0.25;
-// A better effort is taken only where it fits into this share of the budget: an estimate that
-// wavers at its edge must not change the choice each time.
+// A better effort is taken only where it would have fitted into this share of the budget for so
+// many stretches: an estimate that wavers must not change the choice each time.
 constexpr double kMargin = 0.85;
+constexpr int kPatience = 3;
+// The first stretches of a kind, whose memory is touched for the first time, count for nothing once
+// there is a newer one.
+constexpr int kFirst = 2;
 // One stretch says that the machine became slower or faster by this factor at most.
 constexpr double kMostChange = 3;
 // Solves wait while more is owed than this share of a stretch's budget. More than kMostDebt
@@ -54,6 +58,7 @@ void TimeBudget::set(double seconds_per_frame) {
   if (seconds_per_frame == budget_) return;
   budget_ = seconds_per_frame;
   chosen_ = 0;
+  comfortable_for_ = 0;
   since_solve_ = kMostPeriod;
   debt_ = 0;
   choose();
@@ -97,34 +102,45 @@ void TimeBudget::follow_speed(double expected, double seen) {
 
 void TimeBudget::learn_solve(int frames, double frame, const SolveCost& solve) {
   const double area = static_cast<double>(given_.sample_step) * given_.sample_step;
-  if (knows_solves_)
+  const bool known = solves_seen_ >= kFirst;
+  if (known)
     follow_speed(frame_beside_ * frames + once_ + given_.iterations * (iteration_ + pixels_ / area),
                  frame * frames + solve.sum());
-  const double newest = knows_solves_ ? kNewestPart : 1;
-  const auto learn = [newest](double* part, double seen) { *part += newest * (seen - *part); };
+  const auto learn = [known](double* part, double seen) {
+    *part += (known ? kNewestPart : 1) * (seen - *part);
+  };
   learn(&frame_beside_, frame);
   learn(&once_, solve.once);
   learn(&iteration_, solve.iterations / given_.iterations);
   learn(&pixels_, solve.samples * area / given_.iterations);
-  if (!knows_frames_) frame_ = frame_beside_;
-  knows_solves_ = true;
+  if (frames_seen_ == 0) frame_ = frame_beside_;
+  solves_seen_ = std::min(solves_seen_ + 1, kFirst);
 }
 
 void TimeBudget::learn_frame(double frame) {
-  if (knows_frames_) follow_speed(frame_, frame);
-  frame_ += (knows_frames_ ? kNewestPart : 1) * (frame - frame_);
-  knows_frames_ = true;
+  const bool known = frames_seen_ >= kFirst;
+  if (known) follow_speed(frame_, frame);
+  frame_ += (known ? kNewestPart : 1) * (frame - frame_);
+  frames_seen_ = std::min(frames_seen_ + 1, kFirst);
 }
 
 void TimeBudget::choose() {
-  if (!limited() || !knows_solves_) return;
+  if (!limited() || solves_seen_ == 0) return;
   const auto best_within = [this](double allowed) {
     size_t i = 0;
     while (i + 1 < front_.size() && predicted(front_[i]) > allowed) ++i;
     return i;
   };
   chosen_ = std::max(chosen_, best_within(budget_));
-  chosen_ = std::min(chosen_, best_within(kMargin * budget_));
+  const size_t comfortable = best_within(kMargin * budget_);
+  if (comfortable >= chosen_) {
+    comfortable_for_ = 0;
+    return;
+  }
+  comfortable_ = comfortable_for_ > 0 ? std::max(comfortable_, comfortable) : comfortable;
+  if (++comfortable_for_ < kPatience) return;
+  chosen_ = comfortable_;
+  comfortable_for_ = 0;
 }
 
 }  // namespace qdmd

@@ -53,10 +53,14 @@ class TimeBudget {
   // live mode they share the processor), and of a solve what it takes once, for each iteration, and
   // for the samples of an iteration if it saw all pixels.
   double frame_ = 0, frame_beside_ = 0, once_ = 0, iteration_ = 0, pixels_ = 0;
-  bool knows_solves_ = false, knows_frames_ = false;
-  int frames_ = 1;       // of the newest stretch
-  Effort given_;         // to it
+  int solves_seen_ = 0, frames_seen_ = 0;  // stretches with a solve and without, the first few
+  int frames_ = 1;                         // of the newest stretch
+  Effort given_;                           // to it
   int since_solve_ = 0;  // stretches since the newest that was solved, that one included
+  // What would have fitted with room since so many stretches, all of them better than what is
+  // chosen.
+  size_t comfortable_ = 0;
+  int comfortable_for_ = 0;
   // Seconds taken above the budget, and the budget of the newest stretch.
   double debt_ = 0, allowance_ = 0;
 };

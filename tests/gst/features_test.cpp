@@ -416,20 +416,46 @@ TEST(PropertyStorm, LosesNoFrame) {
   }
 }
 
+// A whole number of `stats`.
+guint64 stat_of(const Element& element, const char* name) {
+  GstStructure* stats = nullptr;
+  g_object_get(element.get(), "stats", &stats, nullptr);
+  guint64 wide = 0;
+  guint narrow = 0;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &wide) ||
+              gst_structure_get_uint(stats, name, &narrow))
+      << name;
+  gst_structure_free(stats);
+  return wide + narrow;
+}
+
+// No frame is so fast: after the first window, less and less is done.
+TEST(TimeBudget, TakesWhatIsSetAsTheMost) {
+  Stream stream("qdmdbackground window-size=4 iterations=3 sample-step=2", GST_VIDEO_FORMAT_RGB,
+                160, 120);
+  Element element(stream);
+  element.set("time-budget", 0.000001);
+  stream.push_many(0, 4);
+  EXPECT_EQ(3u, stat_of(element, "iterations"));
+  EXPECT_EQ(2u, stat_of(element, "sample-step"));
+  stream.push_many(4, 4 * 40);
+  EXPECT_EQ(1u, stat_of(element, "iterations"));
+  EXPECT_EQ(4u, stat_of(element, "sample-step"));
+  EXPECT_EQ(16u, stat_of(element, "solve-period"));
+  // Whatever fits, it is no more than what was set.
+  element.set("time-budget", 1e6);
+  stream.push_many(164, 4 * 40);
+  EXPECT_EQ(3u, stat_of(element, "iterations"));
+  EXPECT_EQ(2u, stat_of(element, "sample-step"));
+  EXPECT_EQ(1u, stat_of(element, "solve-period"));
+  EXPECT_EQ(324u, stream.take_all().size());
+}
+
 // No frame is so fast: backgrounds are solved as seldom as it goes.
 TEST(TimeBudget, MakesSolvesRare) {
   Stream stream("qdmdbackground window-size=4 post-messages=true", GST_VIDEO_FORMAT_RGB, 40, 24);
   Element element(stream);
-  const auto stat = [&](const char* name) {
-    GstStructure* stats = nullptr;
-    g_object_get(element.get(), "stats", &stats, nullptr);
-    guint64 solves = 0;
-    guint period = 0;
-    gst_structure_get_uint64(stats, name, &solves);
-    gst_structure_get_uint(stats, name, &period);
-    gst_structure_free(stats);
-    return solves + period;
-  };
+  const auto stat = [&](const char* name) { return stat_of(element, name); };
   stream.push_many(0, 40);
   EXPECT_EQ(10u, stat("solves"));
   EXPECT_EQ(1u, stat("solve-period"));
@@ -449,6 +475,8 @@ TEST(TimeBudget, MakesSolvesRare) {
     double time = -1;
     EXPECT_TRUE(gst_structure_get(s, "solve-period", G_TYPE_UINT, &period, "time-per-frame",
                                   G_TYPE_DOUBLE, &time, nullptr));
+    EXPECT_TRUE(gst_structure_has_field_typed(s, "sample-step", G_TYPE_UINT));
+    EXPECT_TRUE(gst_structure_has_field_typed(s, "iterations", G_TYPE_UINT));
     EXPECT_GE(time, 0);
     gst_message_unref(message);
   }
