@@ -4,6 +4,7 @@
 #include <new>
 #include <utility>
 
+#include "core/background/stopwatch.h"
 #include "core/regions/regions.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
@@ -192,10 +193,16 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     }
     const bool written = guarded(self, [&] {
       frames->engine.set_foreground_threshold(settings.engine.foreground_threshold);
-      if (settings.regions) regions = next_regions(self, settings.regions_min_area);
-      frames->io.write(&frame, settings.output, [&](const MutableImageView& view) {
-        frames->engine.pop(settings.output, view);
-      });
+      double all = 0, popping = 0;
+      {
+        const Stopwatch watch(&all);
+        if (settings.regions) regions = next_regions(self, settings.regions_min_area);
+        frames->io.write(&frame, settings.output, [&](const MutableImageView& view) {
+          const Stopwatch pop_watch(&popping);
+          frames->engine.pop(settings.output, view);
+        });
+      }
+      frames->engine.add_time(all - popping);
       return Status();
     });
     if (!written) return GST_FLOW_ERROR;
@@ -305,7 +312,15 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       frames->engine.set_freeze(freeze);
       frames->engine.set_threads(threads);
       frames->engine.set_time_budget(budget / 1000);
-      return frames->engine.push(frames->io.read(frame));
+      double conversion = 0;
+      const auto read = [&] {
+        const Stopwatch watch(&conversion);
+        return frames->io.read(frame);
+      };
+      const ImageView view = read();
+      const Status status = frames->engine.push(view);
+      frames->engine.add_time(conversion);
+      return status;
     });
     if (!taken) {
       drop_frames(self);

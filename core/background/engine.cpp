@@ -63,7 +63,8 @@ Status Engine::configure(const EngineOptions& options, int width, int height) {
   live_ = LiveSolver(schedule_of(options, pixels), &solver_, side_.get());
   const bool robust = options.dmd.method == Method::robust;
   budget_.begin(front_of_efforts({1, robust ? options.iterations : 1, layout.sample_step}, robust,
-                                 width, height));
+                                 width, height),
+                live ? schedule_of(options, pixels).hop_size() : options.window_size);
   alpha_ = AlphaStore(layout.capacity);
   window_ = Window(layout.capacity, pixels);
   return {};
@@ -90,6 +91,7 @@ void Engine::flush() {
   has_model_ = start_new_window_ = frozen_ = skip_solve_ = follows_light_ = false;
   stretch_frames_ = 0;
   stretch_seconds_ = stretch_solve_ = 0;
+  budget_.solve_next();
 }
 
 // Makes room for the frame and splits it.
@@ -113,13 +115,18 @@ Status Engine::push(const ImageView& frame) {
   if (frame.width != width_ || frame.height != height_)
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
   if (options_.mode == Mode::batch && pending_ == 0) begin_stretch();
-  const Stopwatch watch(&stretch_seconds_);
+  double seconds = 0;
+  {
+    const Stopwatch watch(&seconds);
+    follow_threads();
+    if (options_.mode == Mode::live)
+      push_live(frame);
+    else
+      push_batch(frame);
+  }
+  // A live frame that begins a stretch belongs to it. What it waited for is counted as work.
   ++stretch_frames_;
-  follow_threads();
-  if (options_.mode == Mode::live)
-    push_live(frame);
-  else
-    push_batch(frame);
+  stretch_seconds_ += seconds - live_.take_wait_seconds();
   return {};
 }
 
@@ -137,17 +144,17 @@ void Engine::follow_threads() {
 void Engine::begin_stretch() {
   SolveCost cost;
   if (stretch_solve_ > 0 && !skip_solve_) {
-    // The solver knows its parts, but not what came with them. Live, frames enter the Gram matrix
-    // whether it is solved or not.
+    // The solver knows its parts, but not what came with them.
     cost = solver_.report().cost;
-    const double gram = options_.mode == Mode::live ? solver_.report().gram_time : 0;
-    cost.once = std::max(0.0, cost.once + stretch_solve_ - cost.sum() - gram);
+    cost.once = std::max(0.0, cost.once + stretch_solve_ - cost.sum());
   }
   budget_.add(stretch_frames_, stretch_seconds_, cost);
   stretch_frames_ = 0;
   stretch_seconds_ = stretch_solve_ = 0;
   skip_solve_ = !budget_.next();
   if (!skip_solve_) solver_.set_effort(budget_.effort());
+  // Whoever lets go of a background wants another.
+  if (freeze_) budget_.solve_next();
 }
 
 void Engine::push_batch(const ImageView& frame) {
@@ -222,6 +229,7 @@ void Engine::push_live(const ImageView& frame) {
   };
   const bool freeze = freeze_ && has_model_;
   if (!freeze) count(live_.settle());
+  if (freeze) budget_.solve_next();
   if (freeze || start_new_window_) {
     live_.stop();
     if (has_model_ && !frozen_) {
@@ -238,11 +246,9 @@ void Engine::push_live(const ImageView& frame) {
   solver_.append(window_);
   if (!freeze) {
     const auto solve_now = [this] {
-      // The work of the stretch is over. Beside the frames it was none of theirs, but that some
-      // waited for it.
-      stretch_solve_ = live_.take_work_seconds();
-      const double wait = live_.take_wait_seconds();
-      if (side_->active() && !live_.small()) stretch_seconds_ += stretch_solve_ - wait;
+      // The work of the stretch is over, whoever did it.
+      stretch_solve_ = live_.take_solve_seconds();
+      stretch_seconds_ += live_.take_gram_seconds() + stretch_solve_;
       begin_stretch();
       return !skip_solve_ || !has_model_;
     };
@@ -258,6 +264,8 @@ Status Engine::drain() {
     return {Status::Code::not_configured, "configure the engine before draining it"};
   if (options_.mode == Mode::batch && pending_ > ready_) solve();
   start_new_window_ = true;
+  // An old background says nothing of what comes after.
+  budget_.solve_next();
   return {};
 }
 

@@ -62,6 +62,8 @@ class Engine {
   // at most what the options say (TimeBudget), and pictures then depend on time.
   void set_time_budget(double seconds_per_frame) { budget_.set(seconds_per_frame); }
   const TimeBudget& time_budget() const { return budget_; }
+  // Seconds that a frame takes beside push() and pop(), for instance to be converted: they count.
+  void add_time(double seconds) { stretch_seconds_ += seconds; }
   // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
   void set_threads(int threads) { threads_ = threads; }
 

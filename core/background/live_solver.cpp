@@ -63,18 +63,21 @@ bool LiveSolver::start(const Window& window, double fixed_threshold, bool at_onc
   }
   if (!group_ && !build_) return false;
   fixed_threshold_ = fixed_threshold;
-  if (!at_once) {
-    side_->start([this] { work(); });
-    return false;
+  {
+    const Stopwatch watch(&wait_seconds_);
+    if (!at_once)
+      side_->start([this] { work(); });
+    else
+      while (group_ || build_) work();
   }
-  while (group_ || build_) work();
-  return publish();
+  return at_once && publish();
 }
 
 bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange& span,
                              bool at_once) {
   solver_->decompose(span);
   build_ = Build{1, 0, schedule_.frames() - span.size()};
+  const Stopwatch watch(&wait_seconds_);
   if (at_once) {
     work();
     return publish();
@@ -84,14 +87,16 @@ bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange
   return false;
 }
 
-// One frame's share. Pictures come first: the solve after them needs their place.
-void LiveSolver::work() {
-  const Stopwatch watch(&work_seconds_);
-  do_share();
+double LiveSolver::time() const {
+  const int last =
+      solver_->report().window_frames - 1 + schedule_.hop_size() + schedule_.most_late_frames();
+  return static_cast<double>(std::min<int64_t>(schedule_.frames() - 1 - model_start_, last));
 }
 
-void LiveSolver::do_share() {
+// One frame's share. Pictures come first: the solve after them needs their place.
+void LiveSolver::work() {
   if (build_) {
+    const Stopwatch watch(&solve_seconds_);
     solver_->build(build_->done, build_->slices);
     if (++build_->done == build_->slices) {
       solver_->finish(fixed_threshold_);
@@ -100,9 +105,13 @@ void LiveSolver::do_share() {
     }
   }
   if (group_) {
-    solver_->add_to_gram(group_->span, group_->frames, group_->done, group_->slices);
+    {
+      const Stopwatch watch(&gram_seconds_);
+      solver_->add_to_gram(group_->span, group_->frames, group_->done, group_->slices);
+    }
     if (++group_->done < group_->slices) return;
     if (group_->solve) {
+      const Stopwatch watch(&solve_seconds_);
       solver_->decompose(group_->span);
       build_ = Build{group_->build_slices, 0, group_->first_frame};
     }

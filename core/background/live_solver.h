@@ -35,13 +35,16 @@ class LiveSolver {
   // Drops the work that is under way.
   void stop();
 
-  // Seconds of work since the last call. While nothing is under way.
-  double take_work_seconds() { return std::exchange(work_seconds_, 0.0); }
-  // Seconds in which settle() waited for it, since the last call.
+  // Seconds of work since the last call, with the Gram matrix and with solves. While nothing is
+  // under way.
+  double take_gram_seconds() { return std::exchange(gram_seconds_, 0.0); }
+  double take_solve_seconds() { return std::exchange(solve_seconds_, 0.0); }
+  // Seconds in which settle() waited for such work, or start() did it, since the last call.
   double take_wait_seconds() { return std::exchange(wait_seconds_, 0.0); }
 
-  // The newest frame's time in the published model.
-  double time() const { return static_cast<double>(schedule_.frames() - 1 - model_start_); }
+  // The newest frame's time in the published model. Where solves are left out, it ends with the
+  // frames for which the schedule has the model: a mode does not go on to grow or fade.
+  double time() const;
   bool small() const { return schedule_.at_once(); }
 
  private:
@@ -61,7 +64,6 @@ class LiveSolver {
 
   bool start_piece(const LiveSchedule::Step& step, const SnapshotRange& span, bool at_once);
   void work();
-  void do_share();
   bool publish();
 
   LiveSchedule schedule_;
@@ -73,7 +75,8 @@ class LiveSolver {
   std::optional<Build> build_;
   std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
   std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
-  double fixed_threshold_ = 0, work_seconds_ = 0, wait_seconds_ = 0;
+  double fixed_threshold_ = 0;
+  double gram_seconds_ = 0, solve_seconds_ = 0, wait_seconds_ = 0;
 };
 
 }  // namespace qdmd

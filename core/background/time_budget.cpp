@@ -21,8 +21,8 @@ constexpr double kMostChange = 3;
 // Solves wait while more is owed than this share of a stretch's budget. More than kMostDebt
 // stretches are never owed: what a busy machine took for minutes is not paid back.
 constexpr double kLoan = 0.5, kMostDebt = 4;
-// Samples along the short side that the coarsest step leaves.
-constexpr int kFewestSamples = 30;
+// Samples along the short side that the coarsest step leaves: half of those that are chosen.
+constexpr int kFewestSamples = 28;
 
 }  // namespace
 
@@ -33,10 +33,10 @@ std::vector<Effort> front_of_efforts(const Effort& most, bool robust, int width,
       front.push_back(front.back());
       --front.back().iterations;
     }
-    for (int times : {2, 4}) {
-      Effort coarser = front.back();
-      coarser.sample_step = times * most.sample_step;
-      if (std::min(width, height) / coarser.sample_step >= kFewestSamples) front.push_back(coarser);
+    const int side = std::min(width, height);
+    for (int step = 2 * most.sample_step; (side + step - 1) / step >= kFewestSamples; step *= 2) {
+      front.push_back(front.back());
+      front.back().sample_step = step;
     }
   }
   // More of them would cost about the same, and the choice would waver.
@@ -47,20 +47,21 @@ std::vector<Effort> front_of_efforts(const Effort& most, bool robust, int width,
   return front;
 }
 
-void TimeBudget::begin(std::vector<Effort> front) {
+void TimeBudget::begin(std::vector<Effort> front, int frames) {
   const double budget = budget_;
   *this = TimeBudget();
   front_ = std::move(front);
+  frames_ = frames;
   budget_ = budget;
 }
 
 void TimeBudget::set(double seconds_per_frame) {
-  if (seconds_per_frame == budget_) return;
-  budget_ = seconds_per_frame;
+  // No number: no limit.
+  const double budget = seconds_per_frame > 0 ? seconds_per_frame : 0;
+  if (budget == budget_) return;
+  budget_ = budget;
   chosen_ = 0;
   comfortable_for_ = 0;
-  since_solve_ = kMostPeriod;
-  debt_ = 0;
   choose();
 }
 
@@ -81,12 +82,13 @@ bool TimeBudget::next() {
 
 void TimeBudget::add(int frames, double seconds, const SolveCost& solve) {
   if (frames <= 0) return;
-  const double frame = std::max(0.0, seconds - solve.sum()) / frames;
-  if (solve.sum() > 0)
-    learn_solve(frames, frame, solve);
-  else
-    learn_frame(frame);
-  frames_ = frames;
+  if (2 * frames > frames_) {
+    const double frame = std::max(0.0, seconds - solve.sum()) / frames;
+    if (solve.sum() > 0)
+      learn_solve(frames, frame, solve);
+    else
+      learn_frame(frame);
+  }
   allowance_ = budget_ * frames;
   debt_ = std::clamp(debt_ + seconds - allowance_, 0.0, kMostDebt * allowance_);
   choose();

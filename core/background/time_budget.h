@@ -22,16 +22,19 @@ class TimeBudget {
   // More seldom than once in so many stretches makes hardly anything cheaper.
   static constexpr int kMostPeriod = 16;
 
-  // Starts afresh. front: not empty, the best first.
-  void begin(std::vector<Effort> front);
+  // Starts afresh. front: not empty, the best first. frames: of a stretch.
+  void begin(std::vector<Effort> front, int frames);
   // Seconds that a frame may take; 0: no limit, each stretch has the best effort. What was
-  // measured is kept.
+  // measured, and what is owed, is kept.
   void set(double seconds_per_frame);
   bool limited() const { return budget_ > 0; }
 
   // Called once before each stretch: is it solved?
   bool next();
-  // What that stretch took in all, and, where it was solved, what its solve took of it.
+  // The next stretch is solved, whatever is owed: it begins a new scene, or nobody knows it.
+  void solve_next() { since_solve_ = 0; }
+  // What that stretch took in all, and, where it was solved, what its solve took of it. One that
+  // ended early says little of others: it is only paid.
   void add(int frames, double seconds, const SolveCost& solve);
 
   // Of the stretches from now on.
@@ -54,8 +57,8 @@ class TimeBudget {
   // for the samples of an iteration if it saw all pixels.
   double frame_ = 0, frame_beside_ = 0, once_ = 0, iteration_ = 0, pixels_ = 0;
   int solves_seen_ = 0, frames_seen_ = 0;  // stretches with a solve and without, the first few
-  int frames_ = 1;                         // of the newest stretch
-  Effort given_;                           // to it
+  int frames_ = 1;                         // of a stretch
+  Effort given_;                           // to the newest one
   int since_solve_ = 0;  // stretches since the newest that was solved, that one included
   // What would have fitted with room since so many stretches, all of them better than what is
   // chosen.

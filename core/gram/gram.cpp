@@ -36,7 +36,7 @@ SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
     : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)),
       pool_(pool),
       kernel_(kernel),
-      has_sums_(pool ? pool->threads() : 1) {
+      has_sums_(threads()) {
   const auto cols = static_cast<size_t>(kChannels * capacity);
   planes_.reserve(cols);
   sums_size_ = static_cast<size_t>(kChannels * std::min(kRowSnapshots, capacity)) * cols;
@@ -49,7 +49,15 @@ void SlidingGram::add_newest(const Window& window, int count, int span) {
   add_slice(span == 0 ? all : all.newest(span), count, 0, window.plane_size());
 }
 
+// After Pool::resize() there may be more of them.
+void SlidingGram::make_room() {
+  if (threads() <= has_sums_.size()) return;
+  sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * threads());
+  has_sums_.assign(threads(), 0);
+}
+
 void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
+  make_room();
   planes_.clear();
   for (int t = 0; t < span.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
@@ -73,7 +81,7 @@ void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, s
                              col_count, start, end - start, sums);
   };
   std::fill(has_sums_.begin(), has_sums_.end(), uint8_t{0});
-  const size_t parts = part_count(has_sums_.size(), uint64_t{row_count} * col_count, length);
+  const size_t parts = part_count(threads(), uint64_t{row_count} * col_count, length);
   if (parts == 1) {
     add(first, first + length, 0);
     return;

@@ -21,7 +21,8 @@ class SlidingGram {
  public:
   SlidingGram() = default;
   // The threads of `pool` (null: the caller's alone) compute; their number does not change the
-  // bits. The pool outlives this. All memory is taken here: throws std::bad_alloc.
+  // bits. The pool outlives this. All memory is taken here, but for what threads that join the pool
+  // later need: throws std::bad_alloc.
   explicit SlidingGram(int capacity, Pool* pool = nullptr,
                        const Kernel& kernel = kernels().front());
 
@@ -41,6 +42,8 @@ class SlidingGram {
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;
 
  private:
+  size_t threads() const { return pool_ ? pool_->threads() : 1; }
+  void make_room();
   void multiply(int row_snapshots, int col_snapshots, size_t first, size_t length);
   void store(const SnapshotRange& span, int start, int end, bool fresh);
 

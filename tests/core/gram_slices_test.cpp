@@ -186,5 +186,19 @@ TEST(SlidingGramSlices, OfSeveralThreadsAndLargePictures) {
   EXPECT_EQ(sliced.matrix(window), whole.matrix(window));
 }
 
+TEST(SlidingGramSlices, OfAPoolThatGrowsAndShrinks) {
+  std::mt19937 rng(97);
+  constexpr int kFrames = 20;
+  const Window window = random_window(kFrames, 150'001, rng);
+  Pool pool(1);
+  SlidingGram whole(kFrames), gram(kFrames, &pool);
+  whole.add_newest(window, kFrames);
+  for (int threads : {1, 2, 8, 3, 12, 1}) {
+    pool.resize(threads);
+    gram.add_newest(window, kFrames);
+    EXPECT_EQ(gram.matrix(window), whole.matrix(window)) << threads;
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -2,6 +2,7 @@
 #include "core/background/time_budget.h"
 
 #include <chrono>
+#include <limits>
 
 #include "tests/core/robust_util.h"
 
@@ -20,7 +21,7 @@ struct Machine {
   double seconds = 0;
 
   explicit Machine(double allowed, const std::vector<Effort>& front = kFront) {
-    budget.begin(front);
+    budget.begin(front, 10);
     budget.set(allowed);
   }
   void run(int count, double noise = 0, uint32_t seed = 1) {
@@ -56,13 +57,24 @@ struct Machine {
 };
 
 TEST(FrontOfEfforts, GivesUpIterationsThenSamplesThenSolves) {
-  ASSERT_EQ(kFront.size(), 11u);
+  ASSERT_EQ(kFront.size(), 12u);
   EXPECT_EQ(kFront[0], (Effort{1, 2, 2}));
   EXPECT_EQ(kFront[1], (Effort{1, 1, 2}));
   EXPECT_EQ(kFront[2], (Effort{1, 1, 4}));
   EXPECT_EQ(kFront[3], (Effort{1, 1, 8}));
-  EXPECT_EQ(kFront[4], (Effort{2, 1, 8}));
-  EXPECT_EQ(kFront.back(), (Effort{TimeBudget::kMostPeriod, 1, 8}));
+  EXPECT_EQ(kFront[4], (Effort{1, 1, 16}));
+  EXPECT_EQ(kFront[5], (Effort{2, 1, 16}));
+  EXPECT_EQ(kFront.back(), (Effort{TimeBudget::kMostPeriod, 1, 16}));
+}
+
+// The step that robust chooses leaves room for one that is twice as coarse.
+TEST(FrontOfEfforts, HasACoarserStepThanTheDefault) {
+  for (const auto& [width, height] :
+       {std::pair{320, 240}, {768, 576}, {1280, 720}, {1920, 1080}, {640, 480}}) {
+    const int step = RobustSolver::chosen_step(width, height);
+    EXPECT_EQ(front_of_efforts({1, 1, step}, true, width, height)[1], (Effort{1, 1, 2 * step}))
+        << width << "x" << height;
+  }
 }
 
 TEST(FrontOfEfforts, KeepsSamplesOfSmallPicturesAndOfPlainMethods) {
@@ -81,18 +93,18 @@ TEST(TimeBudget, WithoutOneEveryStretchHasTheBest) {
   EXPECT_NEAR(machine.budget.predicted({2, 1, 8}), 0.001 + 0.08125 / 20, 1e-12);
 }
 
-// A solve takes 0.015 a frame of its stretch, 0.01, 0.0085 or 0.008125; 0.001 are not to be had
-// back.
+// A solve takes 0.015 a frame of its stretch, 0.01, 0.0085, 0.0081 or 0.008; 0.001 are not to be
+// had back.
 TEST(TimeBudget, TakesTheBestThatFits) {
   for (const auto& [allowed, chosen] : {std::pair{0.02, Effort{1, 2, 2}},
                                         {0.0165, Effort{1, 2, 2}},
                                         {0.0155, Effort{1, 1, 2}},
                                         {0.0108, Effort{1, 1, 4}},
                                         {0.0093, Effort{1, 1, 8}},
-                                        {0.0053, Effort{2, 1, 8}},
-                                        {0.0048, Effort{3, 1, 8}},
-                                        {0.0018, Effort{12, 1, 8}},
-                                        {0.0005, Effort{16, 1, 8}}}) {
+                                        {0.0053, Effort{2, 1, 16}},
+                                        {0.0048, Effort{3, 1, 16}},
+                                        {0.0018, Effort{12, 1, 16}},
+                                        {0.0005, Effort{16, 1, 16}}}) {
     Machine machine(allowed);
     machine.run(400);
     EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
@@ -145,8 +157,8 @@ TEST(TimeBudget, DoesNotFlap) {
 TEST(TimeBudget, ALoadIsKnownAfterTwoStretches) {
   Machine machine(0.0055);
   machine.run(50);
-  EXPECT_EQ(machine.budget.effort(), (Effort{2, 1, 8}));
-  // Everything takes twice as long: 0.002 + 0.01625 / p must not exceed 0.0055.
+  EXPECT_EQ(machine.budget.effort(), (Effort{2, 1, 16}));
+  // Everything takes twice as long: 0.002 + 0.016 / p must not exceed 0.0055.
   machine.slow_down(2);
   machine.run(2);
   EXPECT_GE(machine.budget.effort().period, 4);
@@ -170,11 +182,42 @@ TEST(TimeBudget, AfterALongLoadSolvesComeBack) {
   EXPECT_GE(machine.solves - before, 10);
 }
 
+// A slider, or a program that follows something, moves it all the time.
+TEST(TimeBudget, ChangingItBuysNoSolves) {
+  Machine machine(0.0018);
+  machine.run(60);
+  const int before = machine.solves;
+  for (int i = 0; i < 60; ++i) {
+    machine.budget.set(i % 2 ? 0.0018 : 0.00181);
+    machine.run(1);
+  }
+  EXPECT_LE(machine.solves - before, 6);
+}
+
+TEST(TimeBudget, WhatIsNoNumberIsNoLimit) {
+  Machine machine(std::numeric_limits<double>::quiet_NaN());
+  machine.run(5);
+  EXPECT_FALSE(machine.budget.limited());
+  EXPECT_EQ(machine.solves, 5);
+}
+
+// After a break in time comes another scene; and a window that ended early is no measure.
+TEST(TimeBudget, ABreakIsFollowedByASolveAndSpoilsNothing) {
+  Machine machine(0.0055);
+  machine.run(20);
+  const double predicted = machine.budget.predicted();
+  machine.budget.next();
+  machine.budget.add(1, 0.1, {0.1, 0, 0});
+  EXPECT_EQ(machine.budget.predicted(), predicted);
+  machine.budget.solve_next();
+  EXPECT_TRUE(machine.budget.next());
+}
+
 TEST(TimeBudget, AnotherOneTakesEffectAtOnce) {
   Machine machine(0.0055);
   machine.run(10);
   machine.budget.set(0.0018);
-  EXPECT_EQ(machine.budget.effort(), (Effort{12, 1, 8}));
+  EXPECT_EQ(machine.budget.effort(), (Effort{12, 1, 16}));
   machine.budget.set(0);
   const int before = machine.solves;
   machine.run(10);
@@ -184,7 +227,7 @@ TEST(TimeBudget, AnotherOneTakesEffectAtOnce) {
 // In live mode hops are short while the window fills up.
 TEST(TimeBudget, StretchesOfOtherLengthsAreOfTheSameSolve) {
   TimeBudget budget;
-  budget.begin(kFront);
+  budget.begin(kFront, 10);
   for (int frames : {1, 2, 4, 8, 10}) {
     EXPECT_TRUE(budget.next());
     budget.add(frames, 0.001 * frames + 0.1, {0.1, 0, 0});
@@ -265,7 +308,6 @@ TEST_P(BudgetOfEngine, ThePredictionComesTrueWithinHalfAsMuch) {
     for (const Outcome& outcome : {free, limited})
       worst = std::max(
           {worst, outcome.predicted / outcome.measured, outcome.measured / outcome.predicted});
-    EXPECT_LE(limited.solves, free.solves);
     if (worst < 1.5 && limited.effort != free.effort) return;
   }
   FAIL() << "off by a factor of " << worst;
@@ -302,6 +344,89 @@ INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfEngine,
 INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfRobust,
                          testing::Combine(testing::Values(Mode::batch, Mode::live),
                                           testing::Values(Method::robust)));
+
+double mean_difference(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
+  return sum / static_cast<double>(a.size());
+}
+
+// Times whose frames do not count: what a live frame without a solve takes must be learned, too.
+TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
+  constexpr int kSide = 96;
+  for (int threads : {1, 2}) {
+    EngineOptions options;
+    options.mode = Mode::live;
+    options.window_size = options.hop_size = 20;
+    options.threads = threads;
+    Engine engine;
+    ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
+    Picture frame(kSide, kSide), out(kSide, kSide);
+    for (int t = 0; t < 100; ++t) {
+      frame.fill(std::vector<uint8_t>(size_t{3} * kSide * kSide, static_cast<uint8_t>(t % 3)));
+      ASSERT_TRUE(engine.push(frame.in()).ok());
+      engine.pop(Output::background, out.out());
+    }
+    const TimeBudget& model = engine.time_budget();
+    EXPECT_GT(model.predicted({TimeBudget::kMostPeriod, 1, 1}),
+              1.01 * model.predicted({1, 1, 1}) / TimeBudget::kMostPeriod);
+  }
+}
+
+// The first window says that the light rises. A background that is kept follows the light as it
+// is; it does not go on to rise.
+TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
+  constexpr int kSide = 64, kWindow = 20;
+  EngineOptions options;
+  options.mode = Mode::live;
+  options.window_size = kWindow;
+  options.threads = 1;
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
+  Picture frame(kSide, kSide), out(kSide, kSide);
+  for (int t = 0; t < 15 * kWindow; ++t) {
+    // From now on a solve is rare.
+    if (t == 3 * kWindow) engine.set_time_budget(1e-9);
+    const double light = 0.6 + 0.4 * std::min(1.0, t / (3.0 * kWindow));
+    std::vector<uint8_t> planes;
+    for (int i = 0; i < 3 * kSide * kSide; ++i)
+      planes.push_back(static_cast<uint8_t>(std::lround((80 + i % 97) * light)));
+    frame.fill(planes);
+    ASSERT_TRUE(engine.push(frame.in()).ok());
+    engine.pop(Output::background, out.out());
+    if (t < 3 * kWindow) continue;
+    EXPECT_LE(mean_difference(out.planes(), planes), 2) << "frame " << t;
+  }
+}
+
+// Whoever lets go of a frozen background has another one at once, in the light that there is.
+TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
+  constexpr int kSide = 64, kWindow = 10;
+  EngineOptions options;
+  options.window_size = kWindow;
+  options.threads = 1;
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
+  engine.set_time_budget(1e-9);
+  Picture frame(kSide, kSide), out(kSide, kSide);
+  for (int t = 0; t < 8 * kWindow; ++t) {
+    engine.set_freeze(t >= kWindow && t < 3 * kWindow);
+    const int light = std::max(60, 100 - 4 * t);
+    std::vector<uint8_t> planes;
+    for (int i = 0; i < 3 * kSide * kSide; ++i)
+      planes.push_back(static_cast<uint8_t>((80 + i % 97) * light / 100));
+    frame.fill(planes);
+    ASSERT_TRUE(engine.push(frame.in()).ok());
+    while (engine.ready()) {
+      engine.pop(Output::background, out.out());
+      // From there on the light does not change.
+      if (t >= 3 * kWindow) {
+        EXPECT_LE(mean_difference(out.planes(), planes), 1.5) << "frame " << t;
+      }
+    }
+  }
+  EXPECT_EQ(engine.solves(), 2u);
+}
 
 // A budget that nothing fits leaves the background of the first window; the light is followed all
 // the same.

@@ -363,15 +363,17 @@ TEST(PlanarFormats, ACutoutIsBlackOutside) {
 
 // ---- Properties while playing ----
 
+// The pictures are large enough for all threads to have work.
 TEST(Threads, ChangeWhilePlayingWithoutChangingPictures) {
-  for (const char* mode : {"batch", "live"}) {
+  for (const char* mode : {"batch sample-step=1", "live sample-step=1", "batch method=qdmd",
+                           "live method=qdmd", "batch method=dmd"}) {
     std::vector<std::vector<uint8_t>> pictures[2];
     for (int changing : {0, 1}) {
       Stream stream(std::string("qdmdbackground window-size=12 n-threads=1 mode=") + mode,
-                    GST_VIDEO_FORMAT_RGB, 80, 60);
+                    GST_VIDEO_FORMAT_RGB, 160, 120);
       Element element(stream);
       for (int t = 0; t < 60; ++t) {
-        if (changing && t % 7 == 3) element.set("n-threads", static_cast<guint>(1 + t % 4));
+        if (changing && t % 7 == 3) element.set("n-threads", static_cast<guint>(1 + t % 9));
         stream.push_many(t, 1);
         for (const auto& buffer : stream.take_all()) {
           pictures[changing].emplace_back(gst_buffer_get_size(buffer.get()));

@@ -42,6 +42,7 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
       parameters_(parameters),
       iterations_(iterations),
       step_(sample_step),
+      capacity_(capacity),
       pool_(pool),
       grid_(width, height, parameters.cells_along),
       cells_(grid_, capacity),
@@ -61,11 +62,12 @@ RobustSolver::RobustSolver(const DmdOptions& options, int iterations, int sample
 void RobustSolver::set_effort(int iterations, int sample_step) {
   iterations_ = iterations;
   if (sample_step == step_) return;
-  step_ = sample_step;
-  const int capacity = samples_.capacity();
-  // The old samples go first: two sets at once would break the promise of max-memory.
+  // The old samples go first: two sets at once would break the promise of max-memory. Until there
+  // are new ones, there is no step.
+  step_ = 0;
   samples_ = Window();
-  samples_ = Window(capacity, sampled(grid_.width, grid_.height, step_));
+  samples_ = Window(capacity_, sampled(grid_.width, grid_.height, sample_step));
+  step_ = sample_step;
 }
 
 void RobustSolver::append(const Window& window, int slot) {

@@ -78,7 +78,7 @@ class RobustSolver {
 
   DmdOptions options_;
   RobustParameters parameters_;
-  int iterations_ = 1, step_ = 1;
+  int iterations_ = 1, step_ = 1, capacity_ = 0;
   SolveCost cost_;
   Pool* pool_ = nullptr;
   Grid grid_;
