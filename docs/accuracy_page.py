@@ -96,6 +96,8 @@ class Quality:
                   robust._replace(window=window)) for window in (200, 100, 50, 25)]
         rows += [(f'its `iterations={count}`', robust._replace(iterations=count))
                  for count in (2, 4)]
+        rows.append(('its `window-size=50 iterations=2`',
+                     robust._replace(window=50, iterations=2)))
         rows += [(f'its `rank={rank}`', robust._replace(rank=rank)) for rank in (2, 3)]
         rows += [(f'its `sample-step={step}`', robust._replace(step=step))
                  for step in (1, 4, 8, 16)]

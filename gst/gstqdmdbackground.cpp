@@ -266,7 +266,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
                          "imaginary part), omega in rad/frame, residual, condition, "
                          "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
                          "what it was given: sample-step, iterations, solve-period (of so many "
-                         "windows or hops one is solved); time-per-frame (ms), as measured",
+                         "windows or hops one is solved); time-per-frame (ms), as learnt",
                          GST_TYPE_STRUCTURE,
                          GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   g_object_class_install_property(

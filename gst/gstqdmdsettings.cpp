@@ -165,8 +165,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_double("time-budget", "Time budget",
                                   "Milliseconds that a frame may take on average (0: no limit); "
-                                  "`iterations` and `sample-step` are then the most that is done, "
-                                  "and solves are as rare as needed",
+                                  "at most `iterations`, and the samples of `sample-step`, are "
+                                  "then used, and solves are as rare as needed",
                                   0, 1e6, d.time_budget, kAnyTime);
      },
      QDMD_DOUBLE(s.time_budget)},

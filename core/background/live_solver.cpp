@@ -88,8 +88,8 @@ bool LiveSolver::start_piece(const LiveSchedule::Step& step, const SnapshotRange
 }
 
 double LiveSolver::time() const {
-  const int last =
-      solver_->report().window_frames - 1 + schedule_.hop_size() + schedule_.most_late_frames();
+  int last = solver_->report().window_frames - 1;
+  if (!solver_->follows_light()) last += schedule_.hop_size() + schedule_.most_late_frames();
   return static_cast<double>(std::min<int64_t>(schedule_.frames() - 1 - model_start_, last));
 }
 

@@ -42,8 +42,9 @@ class LiveSolver {
   // Seconds in which settle() waited for such work, or start() did it, since the last call.
   double take_wait_seconds() { return std::exchange(wait_seconds_, 0.0); }
 
-  // The newest frame's time in the published model. Where solves are left out, it ends with the
-  // frames for which the schedule has the model: a mode does not go on to grow or fade.
+  // The newest frame's time in the published model. Where the light is followed, it ends with the
+  // model's window; else, where solves are left out, with the frames for which the schedule has the
+  // model: a mode does not go on to grow or fade.
   double time() const;
   bool small() const { return schedule_.at_once(); }
 

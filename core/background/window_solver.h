@@ -64,8 +64,9 @@ class WindowSolver {
   // was made for. While no solve is under way.
   void set_effort(const Effort& effort);
 
-  // Sets the model to the light of the frame in `slot` of the window, where the method follows
-  // light.
+  // True where follow_light() does something: the method follows the light of each frame.
+  bool follows_light() const { return robust(); }
+  // Sets the model to the light of the frame in `slot` of the window.
   void follow_light(int slot);
 
   // Of the newest published solve.
