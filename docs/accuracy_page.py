@@ -10,23 +10,9 @@ import sys
 import accuracy_plots
 import accuracy_results as results
 from accuracy_results import Setting, WHOLE
+from page_tables import figure, table
 
 SCENES = (('real', 'real'), ('scene', 'scenes'))
-
-
-def table(head, rows):
-    lines = ['| ' + ' | '.join(head) + ' |', '|---' * len(head) + '|']
-    lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
-    return '\n'.join(lines)
-
-
-def figure(value, unit=''):
-    """Three digits."""
-    if value is None:
-        return ''
-    if abs(value) >= 1000:
-        return f'{value:.0f}{unit}'
-    return f'{value:#.3g}'.rstrip('.') + unit
 
 
 def properties(setting):

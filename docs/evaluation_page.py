@@ -11,6 +11,8 @@ import re
 import statistics
 import sys
 
+from page_tables import table
+
 MEASURES = ('AGE', 'pEPs', 'pCEPs', 'MSSSIM', 'PSNR', 'CQM')
 DERIVED = ('Board', 'Foliage', 'office')  # whose truth was computed from masks
 
@@ -35,12 +37,6 @@ def number(value, measure):
         return ''
     digits = {'AGE': 2, 'PSNR': 2, 'CQM': 2, 'seconds': 2}.get(measure, 4)
     return f'{float(value):.{digits}f}'
-
-
-def table(head, rows):
-    lines = ['| ' + ' | '.join(head) + ' |', '|---' * len(head) + '|']
-    lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
-    return '\n'.join(lines)
 
 
 def titled(sequence):

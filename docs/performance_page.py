@@ -12,6 +12,8 @@ import matplotlib
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt
 
+from page_tables import figure, table
+
 PEERS = (('robust', 'method=robust'), ('qdmd', 'method=qdmd'), ('qdmd_rank_1', 'method=qdmd rank=1'),
          ('qdmd_live', 'method=qdmd mode=live'), ('segmentation', 'segmentation'), ('mog2', 'OpenCV MOG2'),
          ('knn', 'OpenCV KNN'), ('cnt', 'OpenCV CNT'), ('median', 'median'))
@@ -21,21 +23,6 @@ COLOURS = ('#000000', '#0072B2', '#56B4E9', '#009E73', '#D55E00', '#E69F00', '#C
            '#F0E442')
 # The share of memory's speed below which a pass computes, and from which on it waits for memory.
 ARITHMETIC_BELOW, MEMORY_FROM = 0.5, 0.8
-
-
-def table(head, rows):
-    lines = ['| ' + ' | '.join(head) + ' |', '|---' * len(head) + '|']
-    lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
-    return '\n'.join(lines)
-
-
-def figure(value, unit=''):
-    """Three digits."""
-    if value is None:
-        return ''
-    if abs(value) >= 1000:
-        return f'{value:.0f}{unit}'
-    return f'{value:#.3g}'.rstrip('.') + unit
 
 
 class Results:

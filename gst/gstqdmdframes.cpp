@@ -313,11 +313,10 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       frames->engine.set_threads(threads);
       frames->engine.set_time_budget(budget / 1000);
       double conversion = 0;
-      const auto read = [&] {
+      const ImageView view = [&] {
         const Stopwatch watch(&conversion);
         return frames->io.read(frame);
-      };
-      const ImageView view = read();
+      }();
       const Status status = frames->engine.push(view);
       frames->engine.add_time(conversion);
       return status;

@@ -72,8 +72,9 @@ double TimeBudget::predicted(const Effort& effort) const {
 }
 
 bool TimeBudget::next() {
-  const bool due = since_solve_ == 0 || since_solve_ >= kMostPeriod ||
-                   (since_solve_ >= effort().period && (!limited() || debt_ <= kLoan * allowance_));
+  const bool due =
+      since_solve_ == 0 || since_solve_ >= kMostPeriod ||
+      (since_solve_ >= effort().period && (!limited() || debt_ <= kLoan * budget_ * frames_));
   if (due) since_solve_ = 0;
   ++since_solve_;
   given_ = effort();
@@ -89,8 +90,7 @@ void TimeBudget::add(int frames, double seconds, const SolveCost& solve) {
     else
       learn_frame(frame);
   }
-  allowance_ = budget_ * frames;
-  debt_ = std::clamp(debt_ + seconds - allowance_, 0.0, kMostDebt * allowance_);
+  debt_ = std::clamp(debt_ + seconds - budget_ * frames, 0.0, kMostDebt * budget_ * frames_);
   choose();
 }
 

@@ -64,8 +64,7 @@ class TimeBudget {
   // chosen.
   size_t comfortable_ = 0;
   int comfortable_for_ = 0;
-  // Seconds taken above the budget, and the budget of the newest stretch.
-  double debt_ = 0, allowance_ = 0;
+  double debt_ = 0;  // seconds taken above the budget
 };
 
 }  // namespace qdmd

@@ -308,7 +308,7 @@ TEST_P(BudgetOfEngine, ThePredictionComesTrueWithinHalfAsMuch) {
     for (const Outcome& outcome : {free, limited})
       worst = std::max(
           {worst, outcome.predicted / outcome.measured, outcome.measured / outcome.predicted});
-    if (worst < 1.5 && limited.effort != free.effort) return;
+    if (worst < 1.5 && limited.effort != free.effort && limited.measured < free.measured) return;
   }
   FAIL() << "off by a factor of " << worst;
 }
@@ -345,119 +345,104 @@ INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfRobust,
                          testing::Combine(testing::Values(Mode::batch, Mode::live),
                                           testing::Values(Method::robust)));
 
-double mean_difference(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
-  return sum / static_cast<double>(a.size());
-}
+// An engine for pictures of a scene that changes in nothing but its light.
+struct Separator {
+  static constexpr int kSide = 64, kSamples = 3 * kSide * kSide;
+  Engine engine;
+  Picture frame{kSide, kSide}, out{kSide, kSide};
 
-// Times whose frames do not count: what a live frame without a solve takes must be learned, too.
-TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
-  constexpr int kSide = 96;
-  for (int threads : {1, 2}) {
+  Separator(Mode mode, int window, int hop = 0, int threads = 1) {
     EngineOptions options;
-    options.mode = Mode::live;
-    options.window_size = options.hop_size = 20;
+    options.mode = mode;
+    options.window_size = window;
+    options.hop_size = hop;
     options.threads = threads;
-    Engine engine;
-    ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
-    Picture frame(kSide, kSide), out(kSide, kSide);
+    EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
+  }
+  static double level(int sample, double light) { return (80 + sample % 97) * light; }
+  void push(double light) {
+    std::vector<uint8_t> planes;
+    for (int i = 0; i < kSamples; ++i)
+      planes.push_back(static_cast<uint8_t>(std::lround(level(i, light))));
+    frame.fill(planes);
+    EXPECT_TRUE(engine.push(frame.in()).ok());
+  }
+  // How far the next background is from the scene in that light, in levels on average.
+  double pop(double light) {
+    engine.pop(Output::background, out.out());
+    const std::vector<uint8_t> seen = out.planes();
+    double sum = 0;
+    for (int i = 0; i < kSamples; ++i)
+      sum += std::abs(seen[static_cast<size_t>(i)] - level(i, light));
+    return sum / kSamples;
+  }
+};
+
+// What a live frame takes without a solve is not shared among the frames of a period.
+TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
+  for (int threads : {1, 2}) {
+    Separator separator(Mode::live, 20, 20, threads);
     for (int t = 0; t < 100; ++t) {
-      frame.fill(std::vector<uint8_t>(size_t{3} * kSide * kSide, static_cast<uint8_t>(t % 3)));
-      ASSERT_TRUE(engine.push(frame.in()).ok());
-      engine.pop(Output::background, out.out());
+      separator.push(1);
+      separator.pop(1);
     }
-    const TimeBudget& model = engine.time_budget();
+    const TimeBudget& model = separator.engine.time_budget();
     EXPECT_GT(model.predicted({TimeBudget::kMostPeriod, 1, 1}),
               1.01 * model.predicted({1, 1, 1}) / TimeBudget::kMostPeriod);
   }
 }
 
-// The first window says that the light rises. A background that is kept follows the light as it
+// The first windows say that the light rises. A background that is kept follows the light as it
 // is; it does not go on to rise.
 TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
-  constexpr int kSide = 64, kWindow = 20;
-  EngineOptions options;
-  options.mode = Mode::live;
-  options.window_size = kWindow;
-  options.threads = 1;
-  Engine engine;
-  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
-  Picture frame(kSide, kSide), out(kSide, kSide);
+  constexpr int kWindow = 20;
+  Separator separator(Mode::live, kWindow);
   for (int t = 0; t < 15 * kWindow; ++t) {
     // From now on a solve is rare.
-    if (t == 3 * kWindow) engine.set_time_budget(1e-9);
+    if (t == 3 * kWindow) separator.engine.set_time_budget(1e-9);
     const double light = 0.6 + 0.4 * std::min(1.0, t / (3.0 * kWindow));
-    std::vector<uint8_t> planes;
-    for (int i = 0; i < 3 * kSide * kSide; ++i)
-      planes.push_back(static_cast<uint8_t>(std::lround((80 + i % 97) * light)));
-    frame.fill(planes);
-    ASSERT_TRUE(engine.push(frame.in()).ok());
-    engine.pop(Output::background, out.out());
-    if (t < 3 * kWindow) continue;
-    EXPECT_LE(mean_difference(out.planes(), planes), 2) << "frame " << t;
+    separator.push(light);
+    const double error = separator.pop(light);
+    if (t >= 3 * kWindow) {
+      EXPECT_LE(error, 2) << "frame " << t;
+    }
   }
 }
 
 // Whoever lets go of a frozen background has another one at once, in the light that there is.
 TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
-  constexpr int kSide = 64, kWindow = 10;
-  EngineOptions options;
-  options.window_size = kWindow;
-  options.threads = 1;
-  Engine engine;
-  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
-  engine.set_time_budget(1e-9);
-  Picture frame(kSide, kSide), out(kSide, kSide);
+  constexpr int kWindow = 10;
+  Separator separator(Mode::batch, kWindow);
+  separator.engine.set_time_budget(1e-9);
   for (int t = 0; t < 8 * kWindow; ++t) {
-    engine.set_freeze(t >= kWindow && t < 3 * kWindow);
-    const int light = std::max(60, 100 - 4 * t);
-    std::vector<uint8_t> planes;
-    for (int i = 0; i < 3 * kSide * kSide; ++i)
-      planes.push_back(static_cast<uint8_t>((80 + i % 97) * light / 100));
-    frame.fill(planes);
-    ASSERT_TRUE(engine.push(frame.in()).ok());
-    while (engine.ready()) {
-      engine.pop(Output::background, out.out());
+    separator.engine.set_freeze(t >= kWindow && t < 3 * kWindow);
+    const double light = std::max(0.6, 1 - 0.04 * t);
+    separator.push(light);
+    while (separator.engine.ready()) {
+      const double error = separator.pop(light);
       // From there on the light does not change.
       if (t >= 3 * kWindow) {
-        EXPECT_LE(mean_difference(out.planes(), planes), 1.5) << "frame " << t;
+        EXPECT_LE(error, 1.5) << "frame " << t;
       }
     }
   }
-  EXPECT_EQ(engine.solves(), 2u);
+  EXPECT_EQ(separator.engine.solves(), 2u);
 }
 
 // A budget that nothing fits leaves the background of the first window; the light is followed all
 // the same.
 TEST(BudgetOfBatch, ABackgroundThatIsKeptFollowsTheLight) {
-  constexpr int kSide = 64, kWindow = 10;
-  EngineOptions options;
-  options.window_size = kWindow;
-  options.threads = 1;
-  Engine engine;
-  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
-  engine.set_time_budget(1e-9);
-  Picture frame(kSide, kSide), out(kSide, kSide);
+  constexpr int kWindow = 10;
+  const auto light = [](int frame) { return frame < kWindow ? 1 : 1 - frame / 100.0; };
+  Separator separator(Mode::batch, kWindow);
+  separator.engine.set_time_budget(1e-9);
   for (int t = 0; t < 4 * kWindow; ++t) {
-    const int percent = t < kWindow ? 100 : 100 - t;
-    std::vector<uint8_t> planes;
-    for (int i = 0; i < 3 * kSide * kSide; ++i)
-      planes.push_back(static_cast<uint8_t>((80 + i % 97) * percent / 100));
-    frame.fill(planes);
-    ASSERT_TRUE(engine.push(frame.in()).ok());
-    for (int k = t + 1 - kWindow; engine.ready(); ++k) {
-      engine.pop(Output::background, out.out());
-      const int light = k < kWindow ? 100 : 100 - k;
-      const std::vector<uint8_t> seen = out.planes();
-      double error = 0;
-      for (int i = 0; i < 3 * kSide * kSide; ++i)
-        error += std::abs(seen[static_cast<size_t>(i)] - (80 + i % 97) * light / 100.0);
-      // Both roundings, and the gain's.
-      EXPECT_LE(error / (3 * kSide * kSide), 1.5) << "frame " << k;
-    }
+    separator.push(light(t));
+    // Both roundings, and the gain's.
+    for (int k = t + 1 - kWindow; separator.engine.ready(); ++k)
+      EXPECT_LE(separator.pop(light(k)), 1.5) << "frame " << k;
   }
-  EXPECT_EQ(engine.solves(), 1u);
+  EXPECT_EQ(separator.engine.solves(), 1u);
 }
 
 }  // namespace

@@ -391,7 +391,7 @@ TEST(PropertyStorm, LosesNoFrame) {
   constexpr int kFrames = 200;
   for (const char* mode : {"batch", "live hop-size=3", "live hop-size=2 method=qdmd"}) {
     Stream stream(std::string("qdmdbackground window-size=6 mode=") + mode, GST_VIDEO_FORMAT_RGBA,
-                  20, 12);
+                  40, 24);
     Element element(stream);
     std::atomic<bool> stop = false;
     std::thread storm([&] {
@@ -484,6 +484,7 @@ TEST(TimeBudget, MakesSolvesRare) {
   }
 }
 
+// A ramp from 0 to 100 levels over two seconds.
 TEST(Controller, ThresholdFollowsTheFramesTime) {
   Stream stream("qdmdbackground window-size=25 output=mask", GST_VIDEO_FORMAT_RGB, 40, 24);
   Element element(stream);
