@@ -17,6 +17,11 @@ int rows_of(const GstVideoFrame& frame, int c) {
 
 }  // namespace
 
+guint64 FrameIo::bytes(const GstVideoInfo& info) {
+  if (!GST_VIDEO_INFO_IS_YUV(&info)) return 0;
+  return 3 * guint64(GST_VIDEO_INFO_WIDTH(&info)) * guint64(GST_VIDEO_INFO_HEIGHT(&info));
+}
+
 MutableImageView FrameIo::planes(const GstVideoFrame& frame) {
   MutableImageView view;
   view.width = GST_VIDEO_FRAME_WIDTH(&frame);

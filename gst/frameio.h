@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/background/foreground.h"
+#include "core/foreground/foreground.h"
 #include "gst/videoview.h"
 
 namespace qdmd {
@@ -13,6 +13,9 @@ namespace qdmd {
 // three channels. Formats that the core cannot read in place go through planes of this object.
 class FrameIo {
  public:
+  // What it takes for frames of `info`.
+  static guint64 bytes(const GstVideoInfo& info);
+
   ImageView read(const MappedVideoFrame& frame);
   // Calls fill(view), which writes what `output` says, and puts it into the frame. In Y, U and V a
   // residual is shown by its luma, and black and white are those of video: 16 and 235.

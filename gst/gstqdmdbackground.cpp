@@ -65,27 +65,28 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
 
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
-  qdmd::Frames* frames = GST_QDMD_BACKGROUND(object)->frames;
+  qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
   GST_OBJECT_LOCK(object);
-  const bool known = qdmd::set_setting(&frames->settings, id, value);
+  const bool known = qdmd::set_setting(&state->settings, id, value);
   GST_OBJECT_UNLOCK(object);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* value,
                                              GParamSpec* spec) {
-  qdmd::Frames* frames = GST_QDMD_BACKGROUND(object)->frames;
+  qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
   GST_OBJECT_LOCK(object);
-  bool known = qdmd::get_setting(frames->settings, id, value);
+  bool known = qdmd::get_setting(state->settings, id, value);
   if (id == kStatsProperty) {
-    g_value_take_boxed(value, qdmd::make_stats(frames->report, frames->counters));
-    known = true;
-  }
-  if (id == kBackgroundProperty) {
-    g_value_set_boxed(value, frames->background.get());
+    g_value_take_boxed(value, qdmd::make_stats(state->report, state->counters));
     known = true;
   }
   GST_OBJECT_UNLOCK(object);
+  if (id == kBackgroundProperty) {
+    const std::lock_guard lock(state->engine_lock);
+    g_value_take_boxed(value, state->background.get(state->engine, state->io));
+    known = true;
+  }
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
@@ -119,16 +120,16 @@ static GstFlowReturn gst_qdmd_background_transform_frame(GstVideoFilter*, GstVid
 
 // ---- Negotiation, events, queries ---------------------------------------------------------------
 
-static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, GstVideoInfo* in,
-                                             GstCaps*, GstVideoInfo*) {
+static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps* caps,
+                                             GstVideoInfo* in, GstCaps*, GstVideoInfo*) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(filter);
-  qdmd::Frames* frames = self->frames;
+  qdmd::State* state = self->state;
 
   GST_OBJECT_LOCK(self);
-  const Settings settings = frames->settings;
+  const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
 
-  if (!qdmd::configure(self, settings, *in)) return FALSE;
+  if (!qdmd::configure(self, settings, *in, caps)) return FALSE;
 
   const bool has_rate = GST_VIDEO_INFO_FPS_N(in) > 0 && GST_VIDEO_INFO_FPS_D(in) > 0;
   const guint64 rate_n = has_rate ? guint64(GST_VIDEO_INFO_FPS_N(in)) : kAssumedRate;
@@ -137,8 +138,8 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps*, G
       settings.engine.mode == qdmd::Mode::live ? 0 : guint64(settings.engine.window_size - 1);
   const GstClockTime latency = gst_util_uint64_scale(delay * GST_SECOND, rate_d, rate_n);
   GST_OBJECT_LOCK(self);
-  const bool changed = latency != frames->latency;
-  frames->latency = latency;
+  const bool changed = latency != state->latency;
+  state->latency = latency;
   GST_OBJECT_UNLOCK(self);
   GST_INFO_OBJECT(self, "windows of %d frames, latency %" GST_TIME_FORMAT,
                   settings.engine.window_size, GST_TIME_ARGS(latency));
@@ -192,7 +193,7 @@ static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirecti
   GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
   gst_query_parse_latency(query, &live, &min, &max);
   GST_OBJECT_LOCK(self);
-  const GstClockTime own = self->frames->latency;
+  const GstClockTime own = self->state->latency;
   GST_OBJECT_UNLOCK(self);
   min += own;
   if (GST_CLOCK_TIME_IS_VALID(max)) max += own;
@@ -214,38 +215,38 @@ static gboolean gst_qdmd_background_transform_meta(GstBaseTransform*, GstBuffer*
 
 static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
-  qdmd::Frames* frames = self->frames;
+  qdmd::State* state = self->state;
   GST_OBJECT_LOCK(self);
-  frames->counters = {};
-  frames->report = qdmd::SolveReport();
-  const qdmd::SamplePtr old = std::move(frames->background);
+  state->counters = {};
+  state->report = qdmd::SolveReport();
   GST_OBJECT_UNLOCK(self);
+  const std::lock_guard lock(state->engine_lock);
+  state->background.forget();
   return TRUE;
 }
 
 static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
   GstQdmdBackground* self = GST_QDMD_BACKGROUND(trans);
-  qdmd::drop_frames(self);
-  self->frames->engine.close();
+  qdmd::close(self);
   return TRUE;
 }
 
 // ---- Class --------------------------------------------------------------------------------------
 
 static void gst_qdmd_background_finalize(GObject* object) {
-  delete GST_QDMD_BACKGROUND(object)->frames;
+  delete GST_QDMD_BACKGROUND(object)->state;
   G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_qdmd_background_init(GstQdmdBackground* self) {
-  self->frames = new qdmd::Frames();
+  self->state = new qdmd::State();
   // A decomposition in time needs every frame.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 
 static void gst_qdmd_background_reset(GstQdmdBackground* self) {
   GST_OBJECT_LOCK(self);
-  self->frames->reset_asked = true;
+  self->state->reset_asked = true;
   GST_OBJECT_UNLOCK(self);
 }
 
@@ -273,7 +274,8 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       object_class, kBackgroundProperty,
       g_param_spec_boxed("background", "Background",
                          "The newest background picture in the output's caps, with the time of the "
-                         "frames that came out with its solve; null before the first solve",
+                         "frames that came out with its solve; null before the first solve. It is "
+                         "made when you ask, which waits for a solve that is under way",
                          GST_TYPE_SAMPLE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   /**
    * GstQdmdBackground::reset:

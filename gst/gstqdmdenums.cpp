@@ -1,7 +1,7 @@
 #include "gst/gstqdmdenums.h"
 
-#include "core/background/engine_options.h"
-#include "core/background/foreground.h"
+#include "core/engine/engine_options.h"
+#include "core/foreground/foreground.h"
 
 using qdmd::Output;
 
@@ -41,6 +41,13 @@ GType gst_qdmd_background_method_get_type() {
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundMethod", values);
   return type;
+}
+
+const char* qdmd::method_name(Method method) {
+  auto* methods = static_cast<GEnumClass*>(g_type_class_ref(gst_qdmd_background_method_get_type()));
+  const char* name = g_enum_get_value(methods, gint(method))->value_nick;
+  g_type_class_unref(methods);
+  return name;
 }
 
 GType gst_qdmd_background_amplitude_get_type() {

@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include "core/learn/method.h"
+
 // Values of `output`, `mode`, `method`, `amplitude` and `solver` are those of the core's
 // enumerations.
 GType gst_qdmd_background_output_get_type();
@@ -10,3 +12,10 @@ GType gst_qdmd_background_method_get_type();
 GType gst_qdmd_background_amplitude_get_type();
 GType gst_qdmd_background_solver_get_type();
 GType gst_qdmd_background_mode_get_type();
+
+namespace qdmd {
+
+// As users write it.
+const char* method_name(Method method);
+
+}  // namespace qdmd

@@ -4,8 +4,8 @@
 #include <new>
 #include <utility>
 
-#include "core/background/stopwatch.h"
-#include "core/regions/regions.h"
+#include "core/foreground/regions.h"
+#include "gst/gstqdmdenums.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -34,71 +34,78 @@ static void post_status(GstQdmdBackground* self, const Status& status) {
   }
 }
 
-// Runs `action` (returning Status); true if it succeeded, else an error is posted. No exception
-// gets past this.
+// Runs `action` (returning Status) with the engine lock; true if it succeeded, else an error is
+// posted. No exception gets past this.
 template <typename Action>
-static bool guarded(GstQdmdBackground* self, Action action) {
+static bool with_engine(GstQdmdBackground* self, Action action) {
+  Status status;
+  bool no_memory = false;
+  gchar* what = nullptr;
   try {
-    const Status status = action();
-    if (status.ok()) return true;
-    post_status(self, status);
+    const std::lock_guard lock(self->state->engine_lock);
+    status = action(self->state->engine);
   } catch (const std::bad_alloc&) {
+    no_memory = true;
+  } catch (const std::exception& error) {
+    what = g_strdup(error.what());
+  }
+  if (no_memory) {
     GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
                       ("Not enough memory for the window: lower window-size or scale the video "
                        "down."),
                       (nullptr));
-  } catch (const std::exception& error) {
-    GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", error.what()));
+    return false;
   }
+  if (what) {
+    GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", what));
+    g_free(what);
+    return false;
+  }
+  if (status.ok()) return true;
+  post_status(self, status);
   return false;
 }
 
+// Forgets what waits, and where time is.
+static void forget_frames(State* state) {
+  state->shells.clear();
+  state->next_pts = GST_CLOCK_TIME_NONE;
+}
+
 void drop_frames(GstQdmdBackground* self) {
-  self->frames->engine.flush();
-  self->frames->shells.clear();
-  self->frames->next_pts = GST_CLOCK_TIME_NONE;
+  State* state = self->state;
+  const std::lock_guard lock(state->engine_lock);
+  state->background.keep(state->engine, state->io);
+  state->engine.flush();
+  forget_frames(state);
+}
+
+void close(GstQdmdBackground* self) {
+  drop_frames(self);
+  const std::lock_guard lock(self->state->engine_lock);
+  self->state->engine.close();
 }
 
 // Copies what others may want to know of the engine.
 static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 frames_out) {
-  Frames* frames = self->frames;
+  State* state = self->state;
+  const Engine& engine = state->engine;
   GST_OBJECT_LOCK(self);
-  frames->counters.frames_in += frames_in;
-  frames->counters.frames_out += frames_out;
-  frames->counters.solves = frames->engine.solves();
-  frames->counters.solve_period = guint(frames->engine.time_budget().effort().period);
-  frames->counters.time_per_frame = 1000 * frames->engine.time_budget().predicted();
-  frames->report = frames->engine.report();
+  state->counters.frames_in += frames_in;
+  state->counters.frames_out += frames_out;
+  state->counters.solves = engine.solves();
+  state->counters.solve_period = guint(engine.time_budget().effort().period);
+  state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
+  state->report = engine.report();
   GST_OBJECT_UNLOCK(self);
-}
-
-// The newest background as a buffer of the output's format, or null.
-static BufferPtr make_background(GstQdmdBackground* self) {
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
-  BufferPtr buffer(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(info), nullptr));
-  if (!buffer) return nullptr;
-  bool written = false;
-  {
-    MappedVideoFrame frame(info, buffer.get(), GST_MAP_WRITE);
-    if (!frame) return nullptr;
-    const bool done = guarded(self, [&] {
-      self->frames->io.write(&frame, Output::background, [&](const MutableImageView& view) {
-        written = self->frames->engine.write_background(view);
-      });
-      return Status();
-    });
-    written = written && done;
-  }
-  if (!written) return nullptr;
-  return buffer;
 }
 
 // Says what a new solve found. The frames that wait are those that come out with it.
 static void tell_of_solve(GstQdmdBackground* self) {
-  Frames* frames = self->frames;
-  if (frames->engine.solves() == frames->solves_told || frames->shells.empty()) return;
-  frames->solves_told = frames->engine.solves();
-  GstBuffer *first = frames->shells.front().get(), *last = frames->shells.back().get();
+  State* state = self->state;
+  if (state->engine.solves() == state->solves_told || state->shells.empty()) return;
+  state->solves_told = state->engine.solves();
+  GstBuffer *first = state->shells.front(), *last = state->shells.back();
   const GstClockTime timestamp = GST_BUFFER_PTS(first);
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
@@ -107,28 +114,20 @@ static void tell_of_solve(GstQdmdBackground* self) {
                (GST_BUFFER_DURATION_IS_VALID(last) ? GST_BUFFER_DURATION(last) : 0);
 
   const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  SamplePtr sample;
-  GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(self));
-  if (BufferPtr picture = caps ? make_background(self) : nullptr) {
-    GST_BUFFER_PTS(picture.get()) = timestamp;
-    GST_BUFFER_DURATION(picture.get()) = duration;
-    sample.reset(gst_sample_new(picture.get(), caps, &segment, nullptr));
+  {
+    const std::lock_guard lock(state->engine_lock);
+    state->background.solved(segment, timestamp, duration);
   }
-  if (caps) gst_caps_unref(caps);
-
   GST_OBJECT_LOCK(self);
-  const bool post = frames->settings.post_messages;
-  const Counters counters = frames->counters;
-  if (sample) std::swap(frames->background, sample);
+  const bool post = state->settings.post_messages;
+  const Counters counters = state->counters;
   GST_OBJECT_UNLOCK(self);
-  // The old sample ends here, without the lock.
-  sample.reset();
   if (post)
     gst_element_post_message(
         GST_ELEMENT(self),
         gst_message_new_element(
             GST_OBJECT(self),
-            make_solve_message(frames->engine.report(), counters, segment, timestamp, duration)));
+            make_solve_message(state->engine.report(), counters, segment, timestamp, duration)));
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -142,14 +141,14 @@ static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
 
 // Regions of the frame that comes out next.
 static std::vector<Region> next_regions(GstQdmdBackground* self, int least_area) {
-  Frames* frames = self->frames;
+  State* state = self->state;
   const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
   const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  frames->mask.resize(pixels);
-  frames->residual.resize(pixels);
-  frames->engine.foreground(frames->mask.data(), frames->residual.data());
-  return find_regions(frames->mask.data(), frames->residual.data(), width, height, least_area);
+  state->mask.resize(pixels);
+  state->residual.resize(pixels);
+  state->engine.foreground(state->mask.data(), state->residual.data());
+  return find_regions(state->mask.data(), state->residual.data(), width, height, least_area);
 }
 
 static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
@@ -167,16 +166,15 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
 }
 
 GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
-  Frames* frames = self->frames;
+  State* state = self->state;
   GstBaseTransform* trans = GST_BASE_TRANSFORM(self);
   *out = nullptr;
-  if (!frames->engine.ready()) return GST_FLOW_OK;
+  if (!state->engine.ready()) return GST_FLOW_OK;
 
-  const BufferPtr shell = std::move(frames->shells.front());
-  frames->shells.pop_front();
+  const BufferPtr shell = state->shells.pop();
   follow_controllers(self, shell.get());
   GST_OBJECT_LOCK(self);
-  const Settings settings = frames->settings;
+  const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
 
   GstBuffer* made = nullptr;
@@ -191,21 +189,18 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
       return GST_FLOW_ERROR;
     }
-    const bool written = guarded(self, [&] {
-      frames->engine.set_foreground_threshold(settings.engine.foreground_threshold);
-      double all = 0, popping = 0;
-      {
-        const Stopwatch watch(&all);
-        if (settings.regions) regions = next_regions(self, settings.regions_min_area);
-        frames->io.write(&frame, settings.output, [&](const MutableImageView& view) {
-          const Stopwatch pop_watch(&popping);
-          frames->engine.pop(settings.output, view);
-        });
-      }
-      frames->engine.add_time(all - popping);
+    const bool written = with_engine(self, [&](Engine& engine) {
+      const Clock::Span span(engine.clock(), Clock::frames);
+      engine.set_foreground_threshold(settings.engine.foreground_threshold);
+      if (settings.regions) regions = next_regions(self, settings.regions_min_area);
+      state->io.write(&frame, settings.output,
+                      [&](const MutableImageView& view) { engine.pop(settings.output, view); });
       return Status();
     });
-    if (!written) return GST_FLOW_ERROR;
+    if (!written) {
+      drop_frames(self);
+      return GST_FLOW_ERROR;
+    }
   }
   attach(buffer.get(), regions);
   publish_report(self, 0, 1);
@@ -214,20 +209,20 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
 }
 
 GstFlowReturn drain(GstQdmdBackground* self) {
-  Frames* frames = self->frames;
-  if (!frames->engine.configured()) return GST_FLOW_OK;
-  GST_DEBUG_OBJECT(self, "draining %u frames", guint(frames->shells.size()));
+  State* state = self->state;
+  if (!state->engine.configured()) return GST_FLOW_OK;
+  GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
-  if (!guarded(self, [&] { return frames->engine.drain(); })) flow = GST_FLOW_ERROR;
+  if (!with_engine(self, [](Engine& engine) { return engine.drain(); })) flow = GST_FLOW_ERROR;
   if (flow == GST_FLOW_OK) tell_of_solve(self);
-  while (flow == GST_FLOW_OK && frames->engine.ready()) {
+  while (flow == GST_FLOW_OK && state->engine.ready()) {
     GstBuffer* buffer = nullptr;
     flow = next_output(self, &buffer);
     if (flow == GST_FLOW_OK && buffer)
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
   }
   if (flow == GST_FLOW_OK) return flow;
-  GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(frames->shells.size()),
+  GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(state->shells.size()),
                    gst_flow_get_name(flow));
   drop_frames(self);
   return flow;
@@ -236,7 +231,7 @@ GstFlowReturn drain(GstQdmdBackground* self) {
 // True where `input` does not follow the frame before: time goes back, or leaves out more than a
 // camera loses. Notes where the next frame is expected.
 static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
-  GstClockTime* next = &self->frames->next_pts;
+  GstClockTime* next = &self->state->next_pts;
   const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
   const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
   const bool has_rate = GST_VIDEO_INFO_FPS_N(info) > 0;
@@ -256,21 +251,40 @@ static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
   return has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
 }
 
-bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideoInfo& info) {
-  Frames* frames = self->frames;
-  frames->shells.clear();
-  frames->solves_told = 0;
-  frames->next_pts = GST_CLOCK_TIME_NONE;
-  return guarded(self, [&] {
-    return frames->engine.configure(settings.engine, GST_VIDEO_INFO_WIDTH(&info),
-                                    GST_VIDEO_INFO_HEIGHT(&info));
+// Says once what somebody set and the method does not look at.
+static void warn_of_settings_without_effect(GstQdmdBackground* self, const Settings& settings) {
+  for (const char* name : options_without_effect(settings.engine.method)) {
+    const guint id = g_object_class_find_property(G_OBJECT_GET_CLASS(self), name)->param_id;
+    const guint bit = 1u << id;
+    if (!(settings.asked & bit) || (self->state->warned & bit)) continue;
+    self->state->warned |= bit;
+    GST_WARNING_OBJECT(self, "method=%s does not look at %s: it has no effect",
+                       method_name(settings.engine.method), name);
+  }
+}
+
+bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideoInfo& info,
+               GstCaps* caps) {
+  State* state = self->state;
+  warn_of_settings_without_effect(self, settings);
+  forget_frames(state);
+  state->solves_told = 0;
+  EngineOptions options = settings.engine;
+  options.caller_bytes = FrameIo::bytes(info);
+  return with_engine(self, [&](Engine& engine) {
+    state->background.keep(engine, state->io);
+    state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
+    const Status status =
+        engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
+    if (status.ok()) state->shells.reserve(static_cast<size_t>(options.window_size));
+    return status;
   });
 }
 
 GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
   follow_controllers(self, input);
   GST_OBJECT_LOCK(self);
-  const bool reset = std::exchange(self->frames->reset_asked, false);
+  const bool reset = std::exchange(self->state->reset_asked, false);
   GST_OBJECT_UNLOCK(self);
   const bool jump = time_jumps(self, input);
   if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
@@ -285,15 +299,15 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
 }
 
 GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
-  Frames* frames = self->frames;
+  State* state = self->state;
   // The base class asks for frames until there is none, or until downstream refuses one (it has
   // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
-  if (frames->engine.ready()) drop_frames(self);
+  if (state->engine.ready()) drop_frames(self);
 
   GST_OBJECT_LOCK(self);
-  const bool freeze = frames->settings.freeze;
-  const int threads = frames->settings.engine.threads;
-  const double budget = frames->settings.time_budget;
+  const bool freeze = state->settings.freeze;
+  const int threads = state->settings.engine.threads;
+  const double budget = state->settings.time_budget;
   GST_OBJECT_UNLOCK(self);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
@@ -307,19 +321,13 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
                         ("A buffer does not hold a frame of the negotiated caps."), (nullptr));
       return GST_FLOW_ERROR;
     }
-    const bool taken = guarded(self, [&] {
-      frames->shells.push_back(std::move(shell));
-      frames->engine.set_freeze(freeze);
-      frames->engine.set_threads(threads);
-      frames->engine.set_time_budget(budget / 1000);
-      double conversion = 0;
-      const ImageView view = [&] {
-        const Stopwatch watch(&conversion);
-        return frames->io.read(frame);
-      }();
-      const Status status = frames->engine.push(view);
-      frames->engine.add_time(conversion);
-      return status;
+    const bool taken = with_engine(self, [&](Engine& engine) {
+      const Clock::Span span(engine.clock(), Clock::frames);
+      state->shells.push(std::move(shell));
+      engine.set_freeze(freeze);
+      engine.set_threads(threads);
+      engine.set_time_budget(budget / 1000);
+      return engine.push(state->io.read(frame));
     });
     if (!taken) {
       drop_frames(self);

@@ -64,10 +64,10 @@ const Property kProperties[] = {
      QDMD_UINT(s.engine.hop_size)},
     {[](const Settings& d) {
        return g_param_spec_enum("method", "Method", "How a window is decomposed",
-                                gst_qdmd_background_method_get_type(), gint(d.engine.dmd.method),
+                                gst_qdmd_background_method_get_type(), gint(d.engine.method),
                                 kAtStart);
      },
-     QDMD_ENUM(s.engine.dmd.method)},
+     QDMD_ENUM(s.engine.method)},
     {[](const Settings& d) {
        return g_param_spec_uint("rank", "Rank",
                                 "Singular values that the decomposition keeps (0: all for qdmd and "
@@ -85,13 +85,17 @@ const Property kProperties[] = {
      QDMD_DOUBLE(s.engine.dmd.omega_threshold)},
     {[](const Settings& d) {
        return g_param_spec_enum(
-           "amplitude", "Amplitude", "Which frames decide how strong the background mode is",
+           "amplitude", "Amplitude",
+           "Which frames decide how strong the background mode is (not used by method=robust: "
+           "always all of them)",
            gst_qdmd_background_amplitude_get_type(), gint(d.engine.dmd.amplitude), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.amplitude)},
     {[](const Settings& d) {
        return g_param_spec_enum(
-           "solver", "Solver", "How method=qdmd is computed; same picture, other cost",
+           "solver", "Solver",
+           "How the decomposition of method=qdmd and robust is computed; same picture, other cost "
+           "(not used by method=dmd)",
            gst_qdmd_background_solver_get_type(), gint(d.engine.dmd.solver), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.solver)},
@@ -107,7 +111,7 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("iterations", "Iterations",
                                 "How often method=robust takes out the foreground and decomposes "
-                                "what is left",
+                                "what is left (not used by qdmd and dmd)",
                                 1, guint(EngineOptions::kMaxIterations), guint(d.engine.iterations),
                                 kAtStart);
      },
@@ -122,8 +126,8 @@ const Property kProperties[] = {
      QDMD_DOUBLE(s.engine.foreground_threshold)},
     {[](const Settings& d) {
        return g_param_spec_uint64("max-memory", "Maximum memory",
-                                  "Bytes that the window may take; a larger one is an error", 0,
-                                  G_MAXUINT64, d.engine.max_memory, kAtStart);
+                                  "Bytes that the window and its models may take; more is an error",
+                                  0, G_MAXUINT64, d.engine.max_memory, kAtStart);
      },
      [](Settings& s, const GValue* v) { s.engine.max_memory = g_value_get_uint64(v); },
      [](const Settings& s, GValue* v) { g_value_set_uint64(v, s.engine.max_memory); }},
@@ -165,8 +169,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_double("time-budget", "Time budget",
                                   "Milliseconds that a frame may take on average (0: no limit); "
-                                  "at most `iterations`, and the samples of `sample-step`, are "
-                                  "then used, and solves are as rare as needed",
+                                  "at most the samples of `sample-step` are then used, and solves "
+                                  "are as rare as needed",
                                   0, 1e6, d.time_budget, kAnyTime);
      },
      QDMD_DOUBLE(s.time_budget)},
@@ -185,6 +189,7 @@ void install_settings(GObjectClass* klass) {
 bool set_setting(Settings* settings, guint id, const GValue* value) {
   if (id < 1 || id >= kFirstFreeProperty) return false;
   kProperties[id - 1].set(*settings, value);
+  settings->asked |= 1u << id;
   return true;
 }
 

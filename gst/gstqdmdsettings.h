@@ -3,8 +3,8 @@
 
 #include <gst/gst.h>
 
-#include "core/background/engine_options.h"
-#include "core/background/foreground.h"
+#include "core/engine/engine_options.h"
+#include "core/foreground/foreground.h"
 
 namespace qdmd {
 
@@ -14,6 +14,7 @@ struct Settings {
   int regions_min_area = 0;  // pixels
   double time_budget = 0;    // milliseconds a frame; 0: no limit
   EngineOptions engine;
+  guint asked = 0;  // what somebody has set, a bit for each id
 };
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.

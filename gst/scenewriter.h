@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/background/image_view.h"
+#include "core/base/image_view.h"
 #include "core/scene/scene.h"
 
 namespace qdmd {

@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "core/background/window_solver.h"
+#include "core/engine/background.h"
 
 namespace qdmd {
 

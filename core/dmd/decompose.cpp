@@ -1,5 +1,7 @@
 #include "core/dmd/decompose.h"
 
+#include <algorithm>
+
 #include "core/dmd/channel_dmd.h"
 #include "core/dmd/qdmd.h"
 
@@ -30,21 +32,6 @@ Decomposition single_snapshot() {
   return result;
 }
 
-Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& options) {
-  Decomposition result;
-  result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
-  for (int c = 0; c < kChannels; ++c) {
-    const ChannelModes modes = channel_dmd(channel_gram(gram, c), options);
-    for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)
-      result.background.add_channel_mode(c, modes.combination.col(p), modes.eigenvalues(p),
-                                         modes.reference_times(p), modes.amplitudes(p));
-    const bool converged = result.summary.converged && modes.summary.converged;
-    if (c == 0 || modes.summary.omega > result.summary.omega) result.summary = modes.summary;
-    result.summary.converged = converged;
-  }
-  return result;
-}
-
 }  // namespace
 
 BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
@@ -64,7 +51,6 @@ BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMa
 Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                         const DmdOptions& options) {
   if (gram.rows() == kChannels) return single_snapshot();
-  if (options.method == Method::dmd) return decompose_channels(gram, options);
   const BackgroundModes modes = quaternion_modes(snapshots, gram, options);
   Decomposition result;
   result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
@@ -73,6 +59,51 @@ Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gra
                                modes.reference_times(p), modes.amplitudes.get(p, 0));
   result.summary = modes.summary;
   return result;
+}
+
+Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& options) {
+  if (gram.rows() == kChannels) return single_snapshot();
+  Decomposition result;
+  result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
+  for (int c = 0; c < kChannels; ++c) {
+    const ChannelModes modes = channel_dmd(channel_gram(gram, c), options);
+    for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)
+      result.background.add_channel_mode(c, modes.combination.col(p), modes.eigenvalues(p),
+                                         modes.reference_times(p), modes.amplitudes(p));
+    const bool converged = result.summary.converged && modes.summary.converged;
+    if (c == 0 || modes.summary.omega > result.summary.omega) result.summary = modes.summary;
+    result.summary.converged = converged;
+  }
+  return result;
+}
+
+namespace {
+
+// Of one window, or of one channel of it.
+int most_modes(const DmdOptions& options, int snapshots) {
+  if (!(options.omega_threshold > 0)) return 1;
+  int modes = std::max(1, snapshots - 1);
+  if (options.rank > 0) modes = std::min(modes, options.rank);
+  if (options.max_modes > 0) modes = std::min(modes, options.max_modes);
+  return modes;
+}
+
+}  // namespace
+
+int most_pictures(const DmdOptions& options, int snapshots) {
+  return 4 * most_modes(options, snapshots);
+}
+
+int most_channel_pictures(const DmdOptions& options, int snapshots) {
+  // Real and imaginary part, and the conjugate's; there are no more modes than singular values.
+  const int modes = std::min(2 * most_modes(options, snapshots), std::max(1, snapshots - 1));
+  return kChannels * 2 * modes;
+}
+
+uint64_t decomposition_bytes(int snapshots) {
+  // The integer matrix, the quaternion matrix of it, and what factorizations keep of that.
+  const auto m = static_cast<uint64_t>(snapshots);
+  return m * m * (kChannels * kChannels * sizeof(int64_t) + 8 * 4 * sizeof(double));
 }
 
 }  // namespace qdmd

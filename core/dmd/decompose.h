@@ -12,14 +12,25 @@ struct Decomposition {
   DmdSummary summary;
 };
 
-// Q-DMD of the window by the solver that `options` names; arguments as below. Options::method is
-// not looked at.
+// Q-DMD of the window by the solver that `options` names; arguments as below.
 BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                                  const DmdOptions& options);
 
-// `gram` is the exact Gram matrix of `window` in time order (3m x 3m). The pixels are read by
-// Solver::qr and Solver::adjoint only. m >= 1; a single snapshot is its own background.
+// Q-DMD (the paper's Algorithm 2). `gram` is the exact Gram matrix of `snapshots` in time order
+// (3m x 3m). The pixels are read by Solver::qr and Solver::adjoint only. m >= 1; a single snapshot
+// is its own background.
 Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
                         const DmdOptions& options);
+
+// Exact DMD of each channel by itself (the paper's Algorithm 1); options.solver is not looked at.
+Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& options);
+
+// The pictures that TemporalModel has at most for a window of m snapshots, m >= 1, of the two.
+int most_pictures(const DmdOptions& options, int snapshots);
+int most_channel_pictures(const DmdOptions& options, int snapshots);
+
+// About the bytes that a decomposition of m snapshots takes while it runs, the Gram matrix's
+// included, where the solver does not work on pixels.
+uint64_t decomposition_bytes(int snapshots);
 
 }  // namespace qdmd

@@ -5,12 +5,6 @@
 
 namespace qdmd {
 
-enum class Method {
-  qdmd,   // quaternion DMD, the paper's Algorithm 2
-  dmd,    // exact DMD of each colour channel by itself, the paper's Algorithm 1
-  robust  // the paper's Algorithm 2 on a window without its foreground (RobustSolver)
-};
-
 enum class Solver {
   gram,           // from the exact Gram matrix alone
   gram_extended,  // the same with the Gram matrix factorized in double-double
@@ -24,7 +18,6 @@ enum class Amplitude {
 };
 
 struct DmdOptions {
-  Method method = Method::qdmd;
   Solver solver = Solver::gram;
   Amplitude amplitude = Amplitude::window;
   // Rank of the truncated decomposition; 0, or more than the numerical rank: full.
@@ -32,12 +25,12 @@ struct DmdOptions {
   // Background: all modes with |omega| <= this, in rad/frame. 0, or no mode that near: the one
   // nearest the origin.
   double omega_threshold = 0;
-  // The most modes that count as background (of Method::dmd: in each channel), the nearest to the
+  // The most modes that count as background (of exact DMD: in each channel), the nearest to the
   // origin first; 0: no limit.
   int max_modes = 0;
 };
 
-// Facts about one solve, of the mode nearest the origin (for Method::dmd: of the channel whose
+// Facts about one solve, of the mode nearest the origin (for exact DMD: of the channel whose
 // mode is farthest from it).
 struct DmdSummary {
   int rank = 0;                     // of X, after truncation

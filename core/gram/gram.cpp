@@ -30,7 +30,19 @@ size_t part_count(size_t threads, uint64_t pairs, size_t length) {
   return static_cast<size_t>(std::clamp<uint64_t>(most, 1, by_pixels));
 }
 
+// Elements of one thread's sums of a call.
+size_t sums_size(int capacity) {
+  return static_cast<size_t>(kChannels * std::min(kRowSnapshots, capacity)) *
+         static_cast<size_t>(kChannels * capacity);
+}
+
 }  // namespace
+
+uint64_t SlidingGram::bytes(int capacity, int threads) {
+  const auto cols = static_cast<uint64_t>(kChannels * capacity);
+  return cols * cols * sizeof(int64_t) + cols * sizeof(uint8_t*) +
+         sums_size(capacity) * sizeof(int64_t) * static_cast<uint64_t>(threads);
+}
 
 SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
     : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)),
@@ -39,7 +51,7 @@ SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
       has_sums_(threads()) {
   const auto cols = static_cast<size_t>(kChannels * capacity);
   planes_.reserve(cols);
-  sums_size_ = static_cast<size_t>(kChannels * std::min(kRowSnapshots, capacity)) * cols;
+  sums_size_ = sums_size(capacity);
   // Without touching it.
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * has_sums_.size());
 }

@@ -25,6 +25,8 @@ class SlidingGram {
   // later need: throws std::bad_alloc.
   explicit SlidingGram(int capacity, Pool* pool = nullptr,
                        const Kernel& kernel = kernels().front());
+  // What SlidingGram(capacity) takes with a pool of so many threads.
+  static uint64_t bytes(int capacity, int threads);
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read
@@ -56,7 +58,7 @@ class SlidingGram {
   // do nothing.
   std::unique_ptr<int64_t[]> sums_;
   std::vector<uint8_t> has_sums_;  // whether a thread took part
-  size_t sums_size_ = 0;           // of one thread
+  size_t sums_size_ = 0;           // elements, of one thread
 };
 
 // G_st = x_s^H x_t, m x m, from the identity conj(x) y = x . y - x cross y for pure quaternions.

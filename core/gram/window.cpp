@@ -13,32 +13,41 @@ size_t padded(size_t pixels) { return (pixels + kAlignment - 1) / kAlignment * k
 
 }  // namespace
 
-void Window::Free::operator()(uint8_t* data) const {
+void PlaneSlots::Free::operator()(uint8_t* data) const {
   ::operator delete[](data, std::align_val_t(kAlignment));
 }
 
-uint64_t Window::bytes(int capacity, size_t pixels) {
+uint64_t PlaneSlots::bytes(int capacity, size_t pixels) {
   uint64_t bytes = 0;
   if (__builtin_mul_overflow(static_cast<uint64_t>(capacity) * kChannels, padded(pixels), &bytes))
     return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
 
-Window::Window(int capacity, size_t pixels)
+PlaneSlots::PlaneSlots(int capacity, size_t pixels)
     : capacity_(capacity),
       pixels_(pixels),
       plane_size_(padded(pixels)),
-      data_(static_cast<uint8_t*>(
-          ::operator new[](bytes(capacity, pixels), std::align_val_t(kAlignment)))) {}
+      reserved_(bytes(capacity, pixels)),
+      data_(static_cast<uint8_t*>(::operator new[](reserved_, std::align_val_t(kAlignment)))) {}
+
+void PlaneSlots::pad(int slot) {
+  for (int c = 0; c < kChannels; ++c)
+    std::memset(plane(slot, c) + pixels_, 0, plane_size_ - pixels_);
+}
+
+void PlaneSlots::resize(size_t pixels) {
+  pixels_ = pixels;
+  plane_size_ = padded(pixels);
+}
 
 int Window::append() {
-  if (size_ == capacity_) {
-    oldest_ = (oldest_ + 1) % capacity_;
+  if (size_ == capacity()) {
+    oldest_ = (oldest_ + 1) % capacity();
     --size_;
   }
   const int newest = slot(size_++);
-  for (int c = 0; c < kChannels; ++c)
-    std::memset(plane(newest, c) + pixels_, 0, plane_size_ - pixels_);
+  pad(newest);
   return newest;
 }
 

@@ -5,39 +5,35 @@
 #include <cstdint>
 #include <memory>
 
+#include "core/base/channels.h"
+
 namespace qdmd {
 
-constexpr int kChannels = 3;  // R, G, B: the i, j and k parts of a pixel's pure quaternion
-
-// Up to `capacity` snapshots of `pixels` pixels. A snapshot is three planes of 8-bit samples,
-// kept in the slot where it was written until it is the oldest of a full window; indices count
-// from the oldest snapshot. Planes start at multiples of 64 bytes and are padded with zeros, which
-// add nothing to an inner product.
-class Window {
+// `capacity` slots of three planes of 8-bit samples each. Planes start at multiples of 64 bytes and
+// are padded with zeros, which add nothing to an inner product.
+class PlaneSlots {
  public:
-  Window() = default;
-  // Throws std::bad_alloc. The pages are touched frame by frame, so a short stream in a long window
+  PlaneSlots() = default;
+  // Throws std::bad_alloc. The pages are touched slot by slot, so a short stream in a long window
   // costs only what it fills.
-  Window(int capacity, size_t pixels);
+  PlaneSlots(int capacity, size_t pixels);
 
-  // The bytes that Window(capacity, pixels) reserves.
+  // The bytes that PlaneSlots(capacity, pixels) reserves.
   static uint64_t bytes(int capacity, size_t pixels);
+  uint64_t bytes() const { return reserved_; }
 
   int capacity() const { return capacity_; }
   size_t pixels() const { return pixels_; }
   size_t plane_size() const { return plane_size_; }
-  // Number of snapshots held, 0 .. capacity.
-  int size() const { return size_; }
-  // The slot of snapshot `index`, 0 (oldest) .. size() - 1.
-  int slot(int index) const { return (oldest_ + index) % capacity_; }
 
   const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
   uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
+  // Zeros behind the samples of a slot's planes, whose first pixels() samples the caller fills.
+  void pad(int slot);
 
-  // Makes room for the newest snapshot, dropping the oldest of a full window, and returns its slot.
-  // The caller fills the three planes' first pixels() samples.
-  int append();
-  void clear() { oldest_ = size_ = 0; }
+  // From now on planes have `pixels` samples, at most as many as memory was taken for. What they
+  // hold is lost.
+  void resize(size_t pixels);
 
  private:
   struct Free {
@@ -47,9 +43,32 @@ class Window {
     return (static_cast<size_t>(slot) * kChannels + static_cast<size_t>(channel)) * plane_size_;
   }
 
-  int capacity_ = 0, oldest_ = 0, size_ = 0;
+  int capacity_ = 0;
   size_t pixels_ = 0, plane_size_ = 0;
+  uint64_t reserved_ = 0;
   std::unique_ptr<uint8_t[], Free> data_;
+};
+
+// Up to `capacity` snapshots of `pixels` pixels, a ring of slots. A snapshot is kept in the slot
+// where it was written until it is the oldest of a full window; indices count from the oldest
+// snapshot.
+class Window : public PlaneSlots {
+ public:
+  using PlaneSlots::PlaneSlots;
+
+  // Number of snapshots held, 0 .. capacity.
+  int size() const { return size_; }
+  // The slot of snapshot `index`, 0 (oldest) .. size() - 1.
+  int slot(int index) const { return (oldest_ + index) % capacity(); }
+  int newest_slot() const { return slot(size_ - 1); }
+
+  // Makes room for the newest snapshot, dropping the oldest of a full window, and returns its slot.
+  // The caller fills the three planes' first pixels() samples.
+  int append();
+  void clear() { oldest_ = size_ = 0; }
+
+ private:
+  int oldest_ = 0, size_ = 0;
 };
 
 // Consecutive snapshots of a window, the oldest first. Names their slots, so that it stays right
@@ -60,14 +79,14 @@ class SnapshotRange {
   SnapshotRange(const Window& window) : SnapshotRange(window, 0, window.size()) {}
   // `count` snapshots from index `first` on.
   SnapshotRange(const Window& window, int first, int count)
-      : window_(&window), first_slot_(count > 0 ? window.slot(first) : 0), size_(count) {}
+      : planes_(&window), first_slot_(count > 0 ? window.slot(first) : 0), size_(count) {}
 
   int size() const { return size_; }
-  size_t pixels() const { return window_->pixels(); }
-  size_t plane_size() const { return window_->plane_size(); }
-  int slot(int index) const { return (first_slot_ + index) % window_->capacity(); }
+  size_t pixels() const { return planes_->pixels(); }
+  size_t plane_size() const { return planes_->plane_size(); }
+  int slot(int index) const { return (first_slot_ + index) % planes_->capacity(); }
   const uint8_t* plane(int index, int channel) const {
-    return window_->plane(slot(index), channel);
+    return planes_->plane(slot(index), channel);
   }
 
   // Its last `count` snapshots.
@@ -77,15 +96,15 @@ class SnapshotRange {
     range.size_ = count;
     return range;
   }
-  // The snapshots in the same slots of `window`, which has this one's capacity.
-  SnapshotRange in(const Window& window) const {
+  // What `planes`, of the same capacity, have in the same slots.
+  SnapshotRange in(const PlaneSlots& planes) const {
     SnapshotRange range = *this;
-    range.window_ = &window;
+    range.planes_ = &planes;
     return range;
   }
 
  private:
-  const Window* window_;
+  const PlaneSlots* planes_;
   int first_slot_, size_;
 };
 

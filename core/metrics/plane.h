@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/background/image_view.h"
+#include "core/base/image_view.h"
 
 namespace qdmd {
 

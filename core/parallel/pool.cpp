@@ -16,12 +16,12 @@ void Pool::resize(int threads) {
 
 void Pool::start(int threads) {
   const auto wanted = static_cast<size_t>(std::max(threads, 1)) - 1;
-  workers_.reserve(wanted);
   try {
+    workers_.reserve(wanted);
     for (size_t worker = 1; worker <= wanted; ++worker)
       workers_.emplace_back([this, worker] { work(worker); });
   } catch (const std::exception&) {
-    // The system gives no more threads: those that are there do the work.
+    // The system gives no more threads, or no memory for them: those that are there do the work.
   }
 }
 

@@ -19,7 +19,6 @@ namespace qdmd {
 class Pool {
  public:
   // `threads` counts the caller of run(); fewer work where the system starts no more.
-  // Throws std::bad_alloc.
   explicit Pool(int threads);
   Pool(const Pool&) = delete;
   Pool& operator=(const Pool&) = delete;

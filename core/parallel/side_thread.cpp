@@ -1,6 +1,6 @@
 #include "core/parallel/side_thread.h"
 
-#include <system_error>
+#include <exception>
 #include <utility>
 
 namespace qdmd {
@@ -22,8 +22,8 @@ void SideThread::set_active(bool active) {
 void SideThread::begin() {
   try {
     thread_ = std::thread([this] { loop(); });
-  } catch (const std::system_error&) {
-    // start() does the work itself.
+  } catch (const std::exception&) {
+    // No thread, or no memory for one: start() does the work itself.
   }
 }
 
@@ -77,11 +77,19 @@ bool SideThread::idle() {
   return !busy_;
 }
 
+void SideThread::wait() {
+  if (!thread_.joinable()) return;
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return !busy_; });
+}
+
+void SideThread::abandon() noexcept {
+  wait();
+  error_ = nullptr;
+}
+
 void SideThread::finish() {
-  if (thread_.joinable()) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !busy_; });
-  }
+  wait();
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 

@@ -26,8 +26,8 @@ class SideThread {
   void start(std::function<void()> work);
   // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
   void finish();
-  // True where start() has a thread of its own for its work.
-  bool active() const { return thread_.joinable(); }
+  // The same, and forgets what it threw: nobody waits for the result.
+  void abandon() noexcept;
   // True where nothing runs.
   bool idle();
 
@@ -36,6 +36,7 @@ class SideThread {
   void end();
   void loop() noexcept;
   void run() noexcept;
+  void wait();
 
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "core/metrics/picture_scores.h"
 #include "core/scene/scene.h"
 #include "tests/bench/accuracy_segmentation.h"
@@ -102,7 +102,7 @@ std::vector<size_t> scored_frames(const TrueClip& clip, int window) {
 
 EngineOptions engine_options(const Setting& setting, size_t frames) {
   EngineOptions options;
-  options.dmd.method = setting.method;
+  options.method = setting.method;
   options.dmd.solver = setting.solver;
   options.dmd.rank = setting.rank;
   options.sample_step = setting.step;

@@ -5,7 +5,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "core/dmd/decompose.h"
 #include "tests/bench/camera.h"
 #include "tests/core/clips.h"
@@ -127,7 +127,7 @@ void add_engine(Sweep* sweep, Method method, int frames, const Size& size) {
   };
   const auto work = [=] {
     EngineOptions options;
-    options.dmd.method = method;
+    options.method = method;
     options.window_size = frames;
     options.threads = 1;
     options.max_memory = UINT64_MAX;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"
 
@@ -38,7 +38,7 @@ double time_of(const Size& size, int window, Solver solver) {
   };
 
   EngineOptions options;
-  options.dmd.method = Method::qdmd;
+  options.method = Method::qdmd;
   options.window_size = window;
   options.dmd.solver = solver;
   options.dmd.amplitude = solver == Solver::adjoint ? Amplitude::first_frame : Amplitude::window;

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "core/background/combine.h"
-#include "core/background/foreground.h"
-#include "core/background/planes.h"
-#include "core/background/residual.h"
+#include "core/passes/combine.h"
+#include "core/foreground/foreground.h"
+#include "core/passes/planes.h"
+#include "core/passes/residual.h"
 #include "core/gram/window.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"

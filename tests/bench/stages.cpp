@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/background/engine.h"
-#include "core/background/planes.h"
-#include "core/background/window_solver.h"
+#include "core/engine/engine.h"
+#include "core/passes/planes.h"
+#include "core/learn/window_solver.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"
 

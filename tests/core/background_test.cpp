@@ -1,7 +1,7 @@
 // L(t) as real pictures: the temporal model, its 8-bit evaluation, and what is foreground.
-#include "core/background/background_model.h"
+#include "core/model/background_model.h"
 
-#include "core/background/foreground.h"
+#include "core/foreground/foreground.h"
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
 #include "tests/core/test_util.h"

@@ -1,5 +1,5 @@
 // Combinations of planes and of pictures against sums in more digits, on every instruction set.
-#include "core/background/combine.h"
+#include "core/passes/combine.h"
 
 #include <array>
 #include <memory>

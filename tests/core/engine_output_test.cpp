@@ -271,7 +271,7 @@ TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
   for (Method method : {Method::qdmd, Method::robust})
     for (double fixed : {0.0, 30.0}) {
       auto options = window_of(12);
-      options.dmd.method = method;
+      options.method = method;
       options.foreground_threshold = fixed;
       const Outputs out(clip, options);
       Strip strip(clip.pixels, options);

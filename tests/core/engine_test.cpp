@@ -206,7 +206,8 @@ TEST(EngineStatus, RangesOfTheOptions) {
 
 TEST(EngineStatus, MemoryRefusalSaysWhatToChange) {
   auto options = window_of(50);
-  const uint64_t needed = Window::bytes(50, 640 * 480);
+  const uint64_t needed = layout_of(options, 640, 480).bytes;
+  EXPECT_GT(needed, Window::bytes(50, 640 * 480));
   options.max_memory = needed;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, 640, 480).ok());
@@ -228,7 +229,7 @@ TEST(EngineStatus, AdjointSolverHasAMemoryNeedOfItsOwn) {
   const auto needed = std::to_string(static_cast<uint64_t>(adjoint_bytes(640 * 480, 50)));
   for (const std::string& word : {std::string("window-size"), std::string("solver"), needed})
     EXPECT_NE(status.message.find(word), std::string::npos) << word << " in " << status.message;
-  options.dmd.method = Method::dmd;  // which does not look at the solver
+  options.method = Method::dmd;  // which does not look at the solver
   EXPECT_TRUE(engine.configure(options, 640, 480).ok());
 }
 
@@ -251,7 +252,8 @@ TEST(EngineBackground, UniformWindowsComeBackExactly) {
         for (double threshold : {0.0, 0.2})
           for (const auto& picture : pictures) {
             auto options = window_of(6);
-            options.dmd = {method, solver, amplitude, 0, threshold};
+            options.method = method;
+            options.dmd = {solver, amplitude, 0, threshold};
             Strip strip(picture.size() / 3, options);
             const auto out = strip.run(static_clip(picture, 8), Output::background);
             ASSERT_EQ(out.size(), 8u);

@@ -1,7 +1,7 @@
 // An engine fed from clips, and packed pictures with strides, padding and alpha.
 #pragma once
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "tests/core/test_util.h"
 
 namespace qdmd::test {
@@ -101,7 +101,7 @@ struct Strip {
 // Of plain Q-DMD: what it gives can be said exactly. robust_of() has the default method.
 inline EngineOptions window_of(int size) {
   EngineOptions options;
-  options.dmd.method = Method::qdmd;
+  options.method = Method::qdmd;
   options.window_size = size;
   return options;
 }

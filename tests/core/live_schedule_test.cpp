@@ -1,235 +1,286 @@
-// When the live mode does what: whole hops, warm-up, and work that never meets what comes next.
-#include "core/background/live_schedule.h"
+// A solve whose work is spread over many frames: the same bits, later.
+#include "core/engine/live_solver.h"
 
-#include <gtest/gtest.h>
+#include <optional>
 
-#include <algorithm>
-#include <set>
-#include <string>
-#include <vector>
+#include "tests/core/live_util.h"
 
 namespace qdmd::test {
 namespace {
 
-constexpr uint64_t kMega = uint64_t{1} << 20;
+// A LiveSchedule on its stage, with a plan that takes small frames for large.
+struct Spread {
+  EngineOptions options;
+  size_t pixels;
+  LivePlan plan;
+  Clock clock;
+  Pace pace{&clock};
+  Workers workers;
+  FrameStore frames;
+  Background background;
+  LiveSchedule live;
 
-struct Setting {
-  int window, hop;
-  uint64_t bytes;  // of a frame
-  int first_solve;
+  Spread(const EngineOptions& options_, uint64_t frame_bytes, size_t pixels_, int threads)
+      : options(options_),
+        pixels(pixels_),
+        plan(options.window_size, hop_of(options), frame_bytes),
+        workers(threads),
+        frames(options.window_size + plan.most_late_frames(), static_cast<int>(pixels), 1,
+               {std::max(options.sample_step, 1), 0}),
+        background(Learner::make(options, static_cast<int>(pixels), 1),
+                   {&frames, options.window_size, true, &workers.pool(), &clock}),
+        live({&frames, &background, &workers, &pace, &clock}, plan) {}
+  ~Spread() { live.restart(); }
 
-  std::string text() const {
-    return "window " + std::to_string(window) + ", hop " + std::to_string(hop) + ", " +
-           std::to_string(bytes) + " bytes a frame, first solve " + std::to_string(first_solve);
+  // True where a model was published.
+  bool push(const std::vector<uint8_t>& frame) {
+    Picture picture(static_cast<int>(pixels), 1);
+    picture.fill(frame);
+    const uint64_t solves = background.solves();
+    Queue queue;
+    EXPECT_TRUE(live.push(picture.in(), false, &queue));
+    EXPECT_EQ(queue.pending, 1);
+    EXPECT_EQ(queue.ready, 1);
+    return background.solves() > solves;
+  }
+  // A break: the next frame begins a new window.
+  void drain() {
+    Queue queue;
+    live.drain(&queue);
+  }
+  std::vector<uint8_t> picture() {
+    std::vector<uint8_t> out(3 * pixels);
+    uint8_t* const rows[3] = {out.data(), out.data() + pixels, out.data() + 2 * pixels};
+    live.show_newest();
+    background.model().evaluate(0, pixels, rows);
+    return out;
   }
 };
 
-// From pictures that need no spreading to pictures that are larger than a frame's share.
-std::vector<Setting> settings() {
-  std::vector<Setting> all;
-  for (int window : {2, 3, 4, 5, 8, 16, 17, 20, 31, 32, 33, 60, 100, 200, 513, 2048})
-    for (int hop : {0, 1, 2, 3, 7, 15, 16, 17, 18, 25, 31, 32, 33, 50, 64, 100, 2048})
-      for (uint64_t bytes : {uint64_t{64}, uint64_t{230'400}, kMega, 6 * kMega, 25 * kMega,
-                             40 * kMega, 1000 * kMega, uint64_t{1} << 40})
-        for (bool kept : {false, true}) {
-          if (hop > window) continue;
-          const int used = LiveSchedule(window, hop, bytes).hop_size();
-          all.push_back({window, hop, bytes, kept ? used : 1});
-        }
+// Frame numbers (from 1) of publication, each with the solve's last frame.
+std::vector<std::pair<int, int>> publications(LivePlan plan, int first_solve, int frames) {
+  plan.restart(first_solve);
+  std::vector<std::pair<int, int>> all;
+  for (int frame = 1; frame <= frames; ++frame) {
+    const LivePlan::Step step = plan.next();
+    if (!step.solve) continue;
+    // The first one is waited for. Others: published with the frame after their last slice.
+    const bool at_once = plan.at_once() || (first_solve == 1 && frame == 1);
+    all.emplace_back(at_once ? frame : frame + step.gram_slices + step.build_slices, frame);
+  }
   return all;
 }
 
-LiveSchedule schedule_of(const Setting& setting) {
-  LiveSchedule schedule(setting.window, setting.hop, setting.bytes);
-  schedule.restart(setting.first_solve);
-  return schedule;
+constexpr uint64_t kMega = uint64_t{1} << 20;
+
+void expect_late_models(const Clip& clip, const EngineOptions& options, uint64_t frame_bytes,
+                        int threads) {
+  Spread spread(options, frame_bytes, clip.pixels, threads);
+  const auto expected = publications(spread.plan, 1, static_cast<int>(clip.size()));
+  size_t next = 0, first = 0;
+  std::optional<FreshModel> model;
+  for (size_t t = 0; t < clip.size(); ++t) {
+    const int frame = static_cast<int>(t) + 1;
+    const bool published = spread.push(clip.frames[t]);
+    ASSERT_EQ(published, next < expected.size() && expected[next].first == frame)
+        << "frame " << frame;
+    if (published) {
+      const auto end = static_cast<size_t>(expected[next++].second);
+      const size_t size = std::min(end, static_cast<size_t>(options.window_size));
+      first = end - size;
+      const Clip part = part_of(clip, first, size);
+      model.emplace(
+          part, sampled(part, static_cast<int>(clip.pixels), 1, std::max(options.sample_step, 1)),
+          options);
+      ASSERT_EQ(spread.background.report().window_frames, static_cast<int>(size));
+      ASSERT_EQ(spread.background.report().foreground.threshold, model->foreground.threshold);
+      ASSERT_EQ(spread.background.report().dmd.lambda, model->summary.lambda);
+    }
+    ASSERT_EQ(spread.picture(), model->background(static_cast<double>(t - first)))
+        << "frame " << frame;
+  }
+  EXPECT_GT(next, 3u);
 }
 
-// Enough to be past the warm-up, and three windows more where they are short.
-int frames_of(const Setting& setting) { return 5 * setting.window + 200; }
+TEST(LiveSchedule, SlicedSolvesGiveTheModelsOfWholeOnes) {
+  std::mt19937 rng(321);
+  const Clip clip = moving_box_clip(300, 90, 40, rng);
+  for (const auto& [window, hop] :
+       {std::pair{2, 1}, {5, 1}, {5, 5}, {12, 0}, {16, 4}, {17, 17}, {20, 3}, {32, 25}})
+    for (uint64_t bytes : {kMega, 9 * kMega, 25 * kMega, 100 * kMega, uint64_t{1} << 40}) {
+      SCOPED_TRACE("window " + std::to_string(window) + ", hop " + std::to_string(hop) + ", " +
+                   std::to_string(bytes / kMega) + " MiB a frame");
+      expect_late_models(clip, live_of(window, hop), bytes, 1);
+      ASSERT_FALSE(HasFailure());
+    }
+}
 
-template <typename Check>
-void for_every_setting(Check check) {
-  for (const Setting& setting : settings()) {
-    SCOPED_TRACE(setting.text());
-    check(setting);
-    if (testing::Test::HasFailure()) return;
+TEST(LiveSchedule, ThreadsAndTheSideThreadChangeNoByte) {
+  std::mt19937 rng(322);
+  const Clip clip = moving_box_clip(1000, 60, 40, rng);
+  // More than one thread: the side thread works, too.
+  for (int threads : {1, 2, 3})
+    for (const auto& [window, hop] : {std::pair{5, 1}, {17, 17}, {20, 6}}) {
+      SCOPED_TRACE(std::to_string(threads) + " threads, window " + std::to_string(window));
+      expect_late_models(clip, live_of(window, hop), 25 * kMega, threads);
+      ASSERT_FALSE(HasFailure());
+    }
+}
+
+TEST(LiveSchedule, SlicedSolvesOfSampledPixels) {
+  std::mt19937 rng(323);
+  const Clip clip = moving_box_clip(301, 60, 40, rng);
+  for (int step : {2, 3, 7, 64}) {
+    auto options = live_of(16, 5);
+    options.sample_step = step;
+    options.dmd.rank = 1;
+    expect_late_models(clip, options, 25 * kMega, 2);
+    ASSERT_FALSE(HasFailure()) << step;
   }
 }
 
-TEST(LiveSchedule, HopIsAQuarterOfTheWindowUnlessAskedFor) {
-  EXPECT_EQ(LiveSchedule(100, 0, 1).hop_size(), 25);
-  EXPECT_EQ(LiveSchedule(101, 0, 1).hop_size(), 25);
-  EXPECT_EQ(LiveSchedule(2, 0, 1).hop_size(), 1);
-  EXPECT_EQ(LiveSchedule(3, 0, 1).hop_size(), 1);
-  EXPECT_EQ(LiveSchedule(7, 0, 1).hop_size(), 1);
-  EXPECT_EQ(LiveSchedule(8, 0, 1).hop_size(), 2);
-  EXPECT_EQ(LiveSchedule(100, 1, 1).hop_size(), 1);
-  EXPECT_EQ(LiveSchedule(100, 100, 1).hop_size(), 100);
-}
-
-std::vector<int> solve_frames(LiveSchedule schedule, int frames) {
-  std::vector<int> solves;
-  for (int frame = 1; frame <= frames; ++frame)
-    if (schedule.next().solve) solves.push_back(frame);
-  return solves;
-}
-
-TEST(LiveSchedule, WarmUpGrowsByHalf) {
-  EXPECT_EQ(solve_frames(LiveSchedule(100, 25, 64), 120),
-            (std::vector{1, 2, 3, 4, 6, 9, 13, 19, 28, 42, 63, 88, 113}));
-  EXPECT_EQ(solve_frames(LiveSchedule(100, 3, 64), 15), (std::vector{1, 2, 3, 4, 6, 9, 12, 15}));
-  EXPECT_EQ(solve_frames(LiveSchedule(2, 1, 64), 5), (std::vector{1, 2, 3, 4, 5}));
-  // The size of the pictures does not matter for when.
-  EXPECT_EQ(solve_frames(LiveSchedule(100, 25, 64), 500),
-            solve_frames(LiveSchedule(100, 25, 100 * kMega), 500));
-}
-
-TEST(LiveSchedule, RestartBeginsWithTheSolveThatItIsTold) {
-  LiveSchedule schedule(100, 20, 64);
-  for (int frame = 0; frame < 73; ++frame) schedule.next();
-  EXPECT_EQ(schedule.frames(), 73);
-  schedule.restart(20);
-  EXPECT_EQ(schedule.frames(), 0);
-  EXPECT_EQ(solve_frames(schedule, 130), (std::vector{20, 30, 45, 65, 85, 105, 125}));
-  schedule.restart(1);
-  EXPECT_EQ(solve_frames(schedule, 10), (std::vector{1, 2, 3, 4, 6, 9}));
-}
-
-TEST(LiveSchedule, SolvesAreAtMostAHopApart) {
-  for_every_setting([](const Setting& setting) {
-    const int hop = schedule_of(setting).hop_size();
-    const auto solves = solve_frames(schedule_of(setting), frames_of(setting));
-    ASSERT_FALSE(solves.empty());
-    EXPECT_EQ(solves[0], setting.first_solve);
-    for (size_t k = 1; k < solves.size(); ++k) {
-      const int gap = solves[k] - solves[k - 1];
-      ASSERT_LE(gap, hop) << "at " << solves[k];
-      // Half of what is there, as long as that is less than a hop.
-      if (solves[k - 1] >= 2 * hop || solves[k - 1] >= 2 * setting.window) {
-        ASSERT_EQ(gap, hop) << "at " << solves[k];
-      } else {
-        ASSERT_EQ(gap, std::clamp(solves[k - 1] / 2, 1, hop)) << "at " << solves[k];
-      }
+TEST(LiveSchedule, RestartWithAModelWaitsForAHop) {
+  std::mt19937 rng(324);
+  const Clip clip = moving_box_clip(100, 70, 20, rng);
+  const auto options = live_of(12, 5);
+  for (size_t before : {1, 6, 17, 18, 19, 20}) {
+    Spread spread(options, 25 * kMega, clip.pixels, 2);
+    for (size_t t = 0; t < before; ++t) spread.push(clip.frames[t]);
+    // In the middle of whatever is under way.
+    spread.drain();
+    const auto expected = publications(spread.plan, hop_of(options), 30);
+    size_t next = 0;
+    for (int frame = 1; frame <= 30; ++frame) {
+      const bool published = spread.push(clip.frames[static_cast<size_t>(frame + 30)]);
+      ASSERT_EQ(published, next < expected.size() && expected[next].first == frame)
+          << "frame " << frame << " after " << before;
+      if (!published) continue;
+      const auto end = static_cast<size_t>(expected[next++].second);
+      const size_t size = std::min<size_t>(end, 12);
+      FreshModel model(part_of(clip, 31 + end - size, size), options);
+      ASSERT_EQ(spread.picture(), model.background(static_cast<double>(frame - 1) -
+                                                   static_cast<double>(end - size)));
     }
-    EXPECT_LT(frames_of(setting) - solves.back(), hop);
-  });
+    EXPECT_GT(next, 1u);
+  }
 }
 
-TEST(LiveSchedule, GroupsTakeInEveryFrameOnce) {
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    int64_t taken = 0;
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      ASSERT_EQ(schedule.frames(), frame);
-      ASSERT_GE(step.group, 0);
-      ASSERT_LE(step.group, 16) << "a register tile's rows, at " << frame;
-      ASSERT_LE(step.group, setting.window);
-      taken += step.group;
-      // A group is made of the newest frames.
+// ---- The Gram matrix of a window that slides ----
+
+TEST(LiveGram, TenThousandSlidesInGroupsAndSlicesLeaveTheSameBits) {
+  std::mt19937 rng(325);
+  constexpr size_t kPixels = 333;
+  struct Slide {
+    int window, hop;
+  };
+  for (const Slide& slide : {Slide{5, 2}, {20, 0}, {18, 17}}) {
+    LivePlan schedule(slide.window, slide.hop, 25 * kMega);
+    Window window(slide.window + schedule.most_late_frames(), kPixels);
+    Pool pool(2);
+    SlidingGram gram(window.capacity(), &pool);
+    std::optional<SnapshotRange> span;
+    int group = 0, slices = 0, done = 0, compared = 0;
+    const auto frames = static_cast<int>(10'000 + slide.window);
+    for (int frame = 1; frame <= frames; ++frame) {
+      append_frame(window, random_picture(kPixels, rng, 0, frame % 3 == 0 ? 255 : 254));
+      const LivePlan::Step step = plan.next();
       if (step.group > 0) {
-        ASSERT_EQ(taken, frame);
+        ASSERT_EQ(done, slices);
+        group = step.group;
+        slices = step.gram_slices;
+        done = 0;
+        span = SnapshotRange(window).newest(std::min({frame, slide.window, window.size()}));
       }
-      if (step.solve) {
-        ASSERT_EQ(taken, frame) << "a solve sees its last frame";
+      if (done == slices) continue;
+      const size_t size = window.plane_size() / 64;
+      const auto start = [&](int index) {
+        return index == slices
+                   ? window.plane_size()
+                   : size * static_cast<size_t>(index) / static_cast<size_t>(slices) * 64;
+      };
+      gram.add_slice(*span, group, start(done), start(done + 1) - start(done));
+      if (++done < slices) continue;
+      if (frame > 100 && frame < frames - 100 && frame % 97 != 0) continue;
+      Window alone(span->size(), kPixels);
+      for (int t = 0; t < span->size(); ++t) {
+        const int slot = alone.append();
+        for (int c = 0; c < kChannels; ++c)
+          std::copy_n(span->plane(t, c), kPixels, alone.plane(slot, c));
       }
+      ASSERT_EQ(gram.matrix(*span), gram_of(alone)) << "frame " << frame;
+      ++compared;
     }
-  });
+    EXPECT_GT(compared, 20);
+  }
 }
 
-TEST(LiveSchedule, ASlicedGroupIsOverBeforeTheNext) {
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    int free_from = 1;
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      if (step.group == 0) continue;
-      ASSERT_GE(frame, free_from) << "the group before is still under way";
-      ASSERT_GE(step.gram_slices, 1);
-      ASSERT_LE(step.gram_slices, 16);
-      free_from = frame + step.gram_slices;
-    }
-  });
+// ---- Large frames through the engine ----
+
+// 13 frames of 1 M pixels are more than a slice: solves go on beside the frames.
+struct Large {
+  static constexpr int kWidth = 1024, kHeight = 1024;
+  EngineOptions options = live_of(13, 4);
+  Engine engine;
+  Picture picture{kWidth, kHeight, 3}, out{kWidth, kHeight, 3};
+
+  explicit Large(int threads) {
+    options.threads = threads;
+    options.dmd.rank = 1;
+    EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+    EXPECT_FALSE(LivePlan(13, 4, Window::bytes(1, kWidth * kHeight)).at_once());
+  }
+  const std::vector<uint8_t>& frame(int t, Output output) {
+    std::fill(picture.bytes.begin(), picture.bytes.end(), static_cast<uint8_t>(50 + t % 5));
+    std::fill_n(picture.bytes.begin() + 20'000 * t, 60'000, uint8_t{200});
+    EXPECT_TRUE(engine.push(picture.in()).ok());
+    EXPECT_TRUE(engine.ready());
+    engine.pop(output, out.out());
+    return out.bytes;
+  }
+};
+
+TEST(EngineLargeLive, ThreadsChangeNoByte) {
+  Large one(1), three(3);
+  for (int t = 0; t < 30; ++t) {
+    const Output output = t % 2 ? Output::background : Output::cutout;
+    ASSERT_TRUE(one.frame(t, output) == three.frame(t, output)) << t;
+    ASSERT_EQ(one.engine.solves(), three.engine.solves()) << t;
+  }
+  EXPECT_GT(one.engine.solves(), 7u);
 }
 
-// LiveSolver's order of work: in each frame first a slice of pictures, then a slice of products;
-// the decomposition comes with the last of these.
-TEST(LiveSchedule, PicturesAreOverBeforeTheNextDecomposition) {
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    int build_left = 0, gram_left = 0, build_slices = 0, solves = 0, published = 0;
-    bool solve = false;
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      if (step.group > 0) {
-        gram_left = step.gram_slices;
-        solve = step.solve;
-        build_slices = step.build_slices;
-      }
-      if (build_left > 0 && --build_left == 0) ++published;
-      if (gram_left > 0 && --gram_left == 0 && solve) {
-        ASSERT_EQ(build_left, 0) << "frame " << frame << " would drop a solve";
-        ASSERT_GE(build_slices, 1);
-        ASSERT_LE(build_slices, schedule.hop_size());
-        build_left = build_slices;
-        ++solves;
-      }
-    }
-    EXPECT_GE(published, solves - 1);
-    EXPECT_GT(published, 0);
-  });
+TEST(EngineLargeLive, AThresholdStaysThroughASolveThatIsUnderWay) {
+  Large large(2);
+  uint64_t solves = 0;
+  for (int t = 0; t < 30; ++t) {
+    large.frame(t, Output::mask);
+    EXPECT_EQ(large.engine.report().foreground.threshold, t == 0 ? 18 : 100.0 + t - 1)
+        << "frame " << t << ", " << large.engine.solves() - solves << " new solves";
+    solves = large.engine.solves();
+    large.engine.set_foreground_threshold(100.0 + t);
+    EXPECT_EQ(large.engine.report().foreground.threshold, 100.0 + t);
+  }
 }
 
-// The engine's ring has the window and most_late_frames(): a solve's oldest frame must not be
-// dropped before its pictures are done.
-TEST(LiveSchedule, FramesOfASolveStayInTheRing) {
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    const int64_t capacity = setting.window + schedule.most_late_frames();
-    ASSERT_EQ(schedule.at_once(), schedule.most_late_frames() == 0);
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      if (step.group == 0 || schedule.at_once()) continue;
-      // The last slice of pictures runs beside this frame.
-      const int64_t last = frame + step.gram_slices - 1 + (step.solve ? step.build_slices : 0);
-      const int64_t oldest = frame - std::min<int64_t>(frame, setting.window) + 1;
-      ASSERT_LE(last - oldest + 1, capacity)
-          << "the solve of frame " << frame << " needs its frames until " << last;
+TEST(EngineLargeLive, EndsInTheMiddleOfASolve) {
+  for (int frames = 14; frames < 22; ++frames) {
+    Large large(2);
+    for (int t = 0; t < frames; ++t) large.frame(t, Output::background);
+    switch (frames % 4) {
+      case 0:
+        large.engine.flush();
+        break;
+      case 1:
+        large.engine.close();
+        EXPECT_FALSE(large.engine.configured());
+        break;
+      case 2:
+        EXPECT_TRUE(large.engine.configure(live_of(3), 5, 5).ok());
+        break;
+      default:
+        break;  // The destructor.
     }
-  });
-}
-
-TEST(LiveSchedule, WhatIsSmallIsDoneAtOnce) {
-  // A slice is 32 MiB of the window.
-  EXPECT_TRUE(LiveSchedule(32, 8, kMega).at_once());
-  EXPECT_FALSE(LiveSchedule(33, 8, kMega).at_once());
-  EXPECT_FALSE(LiveSchedule(32, 8, kMega + 64).at_once());
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    if (!schedule.at_once()) return;
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      ASSERT_EQ(step.gram_slices, 1);
-      ASSERT_EQ(step.build_slices, 1);
-    }
-  });
-}
-
-TEST(LiveSchedule, NoFrameReadsMuchMoreThanItsShare) {
-  for_every_setting([](const Setting& setting) {
-    LiveSchedule schedule = schedule_of(setting);
-    const uint64_t whole = setting.bytes * static_cast<uint64_t>(setting.window);
-    for (int frame = 1; frame <= frames_of(setting); ++frame) {
-      const LiveSchedule::Step step = schedule.next();
-      if (step.group == 0 || frame < 4 * setting.window) continue;
-      // 32 MiB, or a sixteenth of the window, or as many slices as there are frames to the next.
-      const auto slices = static_cast<uint64_t>(step.gram_slices);
-      ASSERT_TRUE(whole / slices <= 32 * kMega || slices == 16 ||
-                  step.gram_slices >= std::min(schedule.hop_size(), 8))
-          << step.gram_slices << " slices at frame " << frame;
-    }
-  });
+  }
 }
 
 }  // namespace

@@ -48,7 +48,8 @@ TEST(EngineLive, EverySolverMethodAndAmplitude) {
       for (auto amplitude : {Amplitude::window, Amplitude::first_frame})
         for (int rank : {0, 1, 3}) {
           auto options = live_of(9, 4);
-          options.dmd = {method, solver, amplitude, rank, 0};
+          options.method = method;
+          options.dmd = {solver, amplitude, rank, 0};
           expect_naive(clip, options);
           ASSERT_FALSE(HasFailure()) << "method " << static_cast<int>(method) << ", solver "
                                      << static_cast<int>(solver) << ", rank " << rank;
@@ -61,7 +62,7 @@ TEST(EngineLive, ManyModesAreCappedByTheWindow) {
   for (auto method : {Method::qdmd, Method::dmd})
     for (double threshold : {0.5, 1e9, kInfinity}) {
       auto options = live_of(24, 6);
-      options.dmd.method = method;
+      options.method = method;
       options.dmd.omega_threshold = threshold;
       expect_naive(clip, options);
       Strip strip(clip.pixels, options);
@@ -86,7 +87,7 @@ TEST(EngineLive, DegenerateStreams) {
     for (auto method : {Method::qdmd, Method::dmd})
       for (int hop : {0, 1, 7}) {
         auto options = live_of(7, hop);
-        options.dmd.method = method;
+        options.method = method;
         expect_naive(clip, options);
       }
 }
@@ -97,7 +98,7 @@ TEST(EngineLive, AStillPictureIsItsOwnBackground) {
                               std::vector<uint8_t>(150, 255), std::vector<uint8_t>{0, 0, 1}})
     for (auto method : {Method::qdmd, Method::dmd}) {
       auto options = live_of(6);
-      options.dmd.method = method;
+      options.method = method;
       Strip strip(picture.size() / 3, options);
       for (int t = 0; t < 40; ++t) {
         strip.push(picture);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <string>
 
-#include "core/background/foreground.h"
-#include "core/background/live_schedule.h"
+#include "core/foreground/foreground.h"
+#include "core/engine/live_plan.h"
 #include "core/dmd/decompose.h"
 #include "tests/core/engine_util.h"
 
@@ -53,7 +53,9 @@ struct FreshModel {
     const bool live = options.mode == Mode::live;
     if (live) dmd.max_modes = BackgroundModel::most_modes(options.window_size);
     const Window seen_window = to_window(seen);
-    const Decomposition decomposition = decompose(seen_window, gram_of(seen_window), dmd);
+    const Decomposition decomposition =
+        options.method == Method::dmd ? decompose_channels(gram_of(seen_window), dmd)
+                                      : decompose(seen_window, gram_of(seen_window), dmd);
     summary = decomposition.summary;
     model.begin(window, decomposition.background, live);
     model.build_slice(0, clip.pixels);

@@ -3,9 +3,9 @@
 #include <memory>
 #include <random>
 
-#include "core/background/combine.h"
-#include "core/background/planes.h"
-#include "core/background/residual.h"
+#include "core/passes/combine.h"
+#include "core/passes/planes.h"
+#include "core/passes/residual.h"
 #include "tests/core/simd_targets.h"
 #include "tests/core/test_util.h"
 

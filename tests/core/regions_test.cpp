@@ -1,5 +1,5 @@
 // Boxes around foreground: joined, merged, counted, and left out where they are small.
-#include "core/regions/regions.h"
+#include "core/foreground/regions.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // The passes of robust Q-DMD over pixels against their definitions, on every instruction set of
 // this machine.
-#include "core/background/robust/fill.h"
-#include "core/background/robust/median_picture.h"
+#include "core/passes/fill.h"
+#include "core/learn/robust/median_picture.h"
 #include "tests/core/robust_util.h"
 #include "tests/core/simd_targets.h"
 
@@ -99,8 +99,8 @@ Mask naive_mask(const Case& c, const Gain& gain) {
 std::vector<uint8_t> mask_of(const Case& c, const Gain& gain) {
   // Memory of its own, so that a byte too many is seen.
   BeforeTheEdge<uint8_t> bits(mask_bytes(c.reference.pixels()));
-  std::vector<uint8_t> scratch;
-  find_mask(c.reference, c.x().data(), gain, bits.data(), &scratch);
+  BeforeTheEdge<uint8_t> scratch(mask_scratch_bytes(c.reference.width, c.reference.height));
+  find_mask(c.reference, c.x().data(), gain, bits.data(), scratch.data());
   return {bits.begin(), bits.end()};
 }
 
@@ -394,13 +394,15 @@ struct Stack {
     }
     // The start does not see every frame.
     for (int t = 0; t<count; t += count> 40 ? 2 : 1) frame_of.push_back(t);
-    stable.of_cell.resize(grid.cells());
+    stable.of_cell = FrameLists(grid.cells(), static_cast<int>(frame_of.size()));
     size_t many = 1;
-    for (auto& cell : stable.of_cell) {
-      for (int i = 0; i < static_cast<int>(frame_of.size()); ++i) cell.push_back(i);
-      std::shuffle(cell.begin(), cell.end(), rng);
-      cell.resize(std::min(many, cell.size()));
-      std::sort(cell.begin(), cell.end());
+    for (size_t cell = 0; cell < grid.cells(); ++cell) {
+      std::vector<int> frames(frame_of.size());
+      std::iota(frames.begin(), frames.end(), 0);
+      std::shuffle(frames.begin(), frames.end(), rng);
+      frames.resize(std::min(many, frames.size()));
+      std::sort(frames.begin(), frames.end());
+      for (int frame : frames) stable.of_cell.add(cell, frame);
       many = many % frame_of.size() + 1;
     }
   }
@@ -427,7 +429,7 @@ Median naive_median(const Stack& stack) {
   out.spread.resize(stack.window.pixels());
   for (int row = 0; row < grid.rows; ++row)
     for (int col = 0; col < grid.cols; ++col) {
-      const auto& known = stack.stable.of_cell[static_cast<size_t>(row * grid.cols + col)];
+      const auto known = stack.stable.of_cell[static_cast<size_t>(row * grid.cols + col)];
       std::vector<int> frames;
       const size_t count = std::min<size_t>(known.size(), kMedianFrames);
       // The middles of `count` equal parts.

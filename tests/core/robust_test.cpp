@@ -149,7 +149,7 @@ TEST(RobustEngine, WalkersLeaveNoGhosts) {
     EXPECT_LT(worst_error(backgrounds_of(clip, iterations), background()), 0.7);
   // What a least-squares method leaves.
   EngineOptions plain = robust_of(80);
-  plain.dmd.method = Method::qdmd;
+  plain.method = Method::qdmd;
   plain.dmd.rank = 1;
   EXPECT_GT(worst_error(run_engine(clip, kWidth, kHeight, plain), background()), 4);
 }

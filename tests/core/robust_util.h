@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "core/background/robust/grid.h"
+#include "core/passes/grid.h"
 #include "core/parallel/pool.h"
 #include "tests/core/engine_util.h"
 
@@ -21,7 +21,7 @@ inline Grid grid_of(int rows, int cols) {
 inline EngineOptions robust_of(int window, int iterations = 2) {
   EngineOptions options;
   options.window_size = window;
-  options.dmd.method = Method::robust;
+  options.method = Method::robust;
   options.iterations = iterations;
   options.threads = 1;
   return options;

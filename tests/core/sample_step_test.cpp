@@ -223,7 +223,7 @@ TEST(SampleStep, BytesOfTheLayout) {
   options = live_of(100, 25);
   const EngineLayout layout = layout_of(options, 1920, 1080);
   EXPECT_EQ(layout.capacity,
-            100 + LiveSchedule(100, 25, uint64_t{3} * 1920 * 1080).most_late_frames());
+            100 + LivePlan(100, 25, uint64_t{3} * 1920 * 1080).most_late_frames());
   EXPECT_GT(layout.capacity, 100);
   EXPECT_EQ(layout.bytes, static_cast<uint64_t>(layout.capacity) * 3 * 1920 * 1080);
 }

@@ -1,7 +1,7 @@
 // The engine on simulated scenes, against their true backgrounds and masks.
 #include <cmath>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "core/scene/scene.h"
 #include "gtest/gtest.h"
 

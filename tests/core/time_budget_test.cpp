@@ -1,5 +1,5 @@
 // The time budget: what it chooses from what it measured, and whether that comes true.
-#include "core/background/time_budget.h"
+#include "core/engine/time_budget.h"
 
 #include <chrono>
 #include <limits>
@@ -256,7 +256,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     options.iterations = iterations;
     options.sample_step = sample_step;
     options.mode = std::get<0>(GetParam());
-    options.dmd.method = std::get<1>(GetParam());
+    options.method = std::get<1>(GetParam());
     options.window_size = 20;
     options.hop_size = 20;
     options.threads = 1;

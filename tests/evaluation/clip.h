@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/background/image_view.h"
+#include "core/base/image_view.h"
 #include "tests/evaluation/dataset.h"
 
 namespace qdmd::evaluation {

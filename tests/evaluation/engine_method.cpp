@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "tests/evaluation/background_taker.h"
 #include "tests/evaluation/clip.h"
 
@@ -33,7 +33,7 @@ EngineOptions engine_options(GstElement* element) {
   options.max_memory = max_memory;
   options.dmd.rank = static_cast<int>(rank);
   // The element's enums have the core's values.
-  options.dmd.method = static_cast<qdmd::Method>(method);
+  options.method = static_cast<qdmd::Method>(method);
   options.dmd.amplitude = static_cast<Amplitude>(amplitude);
   options.dmd.solver = static_cast<Solver>(solver);
   return options;

@@ -4,7 +4,7 @@
 #include <set>
 #include <sstream>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "tests/evaluation/evaluate_util.h"
 
 namespace qdmd::test {
@@ -235,7 +235,7 @@ TEST(Pictures, AreTheBackgroundsAtTheirFrames) {
   const Folder data, out;
   write_sequence(data / "s", kFrames);
   EngineOptions options;
-  options.dmd.method = Method::qdmd;
+  options.method = Method::qdmd;
   options.window_size = kFrames;
   const auto l = outputs(frames_of(kFrames), Output::background, options);
   for (const auto& [picture, t] : {std::pair{"first", 0}, {"middle", 7}, {"last", 14}}) {
@@ -299,7 +299,7 @@ TEST(Masks, AreCountedOverTheFramesThatHaveThem) {
   auto frames = frames_of(kFrames);
   frames.erase(frames.begin());
   EngineOptions options;
-  options.dmd.method = Method::qdmd;
+  options.method = Method::qdmd;
   options.window_size = kFrames - 1;
   const auto masks = outputs(frames, Output::mask, options);
   double hits = 0, called = 0, foreground = 0;

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <functional>
 
-#include "core/background/combine.h"
-#include "core/background/engine_options.h"
-#include "core/background/planes.h"
-#include "core/background/robust/robust_solver.h"
+#include "core/passes/combine.h"
+#include "core/engine/engine_options.h"
+#include "core/passes/planes.h"
+#include "core/learn/robust/robust_solver.h"
 #include "core/metrics/picture_scores.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"

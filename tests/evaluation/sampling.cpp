@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <opencv2/core.hpp>
 
-#include "core/background/engine.h"
+#include "core/engine/engine.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"
 
@@ -16,7 +16,7 @@ using namespace qdmd::evaluation;
 // L(t) of each frame, the clip being one window.
 std::vector<cv::Mat> backgrounds(const Clip& clip, int rank, int sample_step) {
   EngineOptions options;
-  options.dmd.method = Method::qdmd;
+  options.method = Method::qdmd;
   options.window_size = static_cast<int>(clip.frames.size());
   options.dmd.rank = rank;
   options.sample_step = sample_step;

@@ -1,0 +1,81 @@
+// The background that frames are compared with, and the one in the making.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "core/foreground/foreground.h"
+#include "core/learn/learner.h"
+
+namespace qdmd {
+
+// About the newest solve.
+struct SolveReport : SolveFacts {
+  ForegroundStatistics foreground;
+};
+
+// Owns a learner and its models. begin(), build() and finish() make the next model, from any
+// thread, one at a time; publish() then makes it the one in use. All else is for who uses that.
+class Background {
+ public:
+  // Learnt anew with each solve; or held as it was; or held, but for the light of each frame.
+  enum class State { learnt, held, held_in_light };
+
+  // keep_pictures: models outlive their window's frames.
+  Background(std::unique_ptr<Learner> learner, const LearnerRoom& room);
+
+  Learner& learner() { return *learner_; }
+  // Forgets the model and what earlier windows showed.
+  void forget();
+
+  // ---- The next ----
+
+  // Learner::decompose(). What is finished and not yet published stays.
+  void begin(const SnapshotRange& snapshots);
+  // Learner::build().
+  void build(Slice slice);
+  // After the last slice. fixed_threshold: of the foreground; 0: from the noise.
+  void finish(double fixed_threshold);
+  // Learnt again.
+  void publish();
+
+  // ---- The one in use ----
+
+  // True once there is one.
+  bool known() const { return known_; }
+  BackgroundModel& model() { return models_[newest_]; }
+  const SolveReport& report() const { return report_; }
+  // Published since this was made.
+  uint64_t solves() const { return solves_; }
+  State state() const { return state_; }
+
+  // Holds the L(t) in use, or goes on holding it, in another state. The snapshots are then no
+  // longer needed.
+  void hold(double t, State state);
+  // L is as it is until publish(), but held no longer.
+  void learn() { state_ = State::learnt; }
+  // Sets L to the light of the frame in `slot`, where the method has one.
+  void follow_light(int slot);
+
+  // A pixel is foreground above this quaternion norm; 0: from the noise.
+  void set_threshold(double fixed);
+  double fixed_threshold() const { return fixed_threshold_; }
+
+ private:
+  int next() const { return room_.keep_pictures ? 1 - newest_ : newest_; }
+
+  LearnerRoom room_;
+  std::unique_ptr<Learner> learner_;
+  // Where pictures are kept, one is in use while the next is built.
+  BackgroundModel models_[2];
+  int newest_ = 0;
+  std::optional<SnapshotRange> snapshots_;  // of the next
+  SolveReport report_, next_report_;
+  State state_ = State::learnt;
+  bool known_ = false;
+  uint64_t solves_ = 0;
+  double fixed_threshold_ = 0;
+};
+
+}  // namespace qdmd

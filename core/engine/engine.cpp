@@ -1,0 +1,189 @@
+#include "core/engine/engine.h"
+
+#include <algorithm>
+
+#include "core/engine/batch_schedule.h"
+#include "core/engine/live_schedule.h"
+#include "core/passes/bands.h"
+
+namespace qdmd {
+namespace {
+
+// Pixels whose share of a pass is worth waking a thread for.
+constexpr size_t kPixelsPerBand = 32768;
+
+}  // namespace
+
+// What an exception leaves half done is dropped.
+template <typename Action>
+auto Engine::flushed_if_it_throws(Action action) {
+  try {
+    return action();
+  } catch (...) {
+    flush();
+    throw;
+  }
+}
+
+Status Engine::configure(const EngineOptions& options, int width, int height) {
+  const Status status = check_options(options, width, height);
+  if (!status.ok()) return status;
+  // The old window goes first: two at once would break the promise of max-memory.
+  close();
+  options_ = options;
+  layout_ = layout_of(options, width, height);
+  try {
+    auto learner = Learner::make(options, width, height);
+    const bool live = options.mode == Mode::live;
+    const LivePlan plan = plan_of(options, width, height);
+    workers_ = std::make_unique<Workers>(options.threads);
+    const uint64_t beside = layout_.bytes - layout_.frame_bytes;
+    frames_ = FrameStore(layout_.capacity, width, height, learner->contents(),
+                         options.max_memory - beside);
+    pace_.begin(front_of_efforts(learner->sample_steps()),
+                live ? plan.hop_size() : options.window_size);
+    // Where frames make room for others before their model is used, its modes are pictures.
+    background_ = std::make_unique<Background>(
+        std::move(learner),
+        LearnerRoom{&frames_, options.window_size, live, &workers_->pool(), &clock_});
+    background_->set_threshold(options.foreground_threshold);
+    const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
+    if (live)
+      schedule_ = std::make_unique<LiveSchedule>(stage, plan);
+    else
+      schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size);
+  } catch (...) {
+    close();
+    throw;
+  }
+  return {};
+}
+
+void Engine::close() {
+  flush();
+  schedule_.reset();
+  // Its threads end before what they work on.
+  workers_.reset();
+  background_.reset();
+  frames_ = FrameStore();
+}
+
+void Engine::flush() {
+  queue_ = {};
+  if (schedule_) {
+    schedule_->restart();
+    background_->forget();
+  }
+  pace_.restart();
+}
+
+Status Engine::push(const ImageView& frame) {
+  if (!configured())
+    return {Status::Code::not_configured, "configure the engine before pushing frames"};
+  if (ready())
+    return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
+  if (frame.width != frames_.width() || frame.height != frames_.height())
+    return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
+  const Clock::Span span(clock_, Clock::frames);
+  return flushed_if_it_throws([&]() -> Status {
+    workers_->follow();
+    if (schedule_->push(frame, freeze_, &queue_)) return {};
+    flush();
+    return alpha_refused();
+  });
+}
+
+Status Engine::alpha_refused() const {
+  return {
+      Status::Code::too_much_memory,
+      "A window-size of " + describe(options_, frames_.width(), frames_.height()) +
+          " whose alpha varies needs " +
+          std::to_string(layout_.bytes - layout_.frame_bytes + frames_.bytes_with_alpha()) +
+          " bytes and max-memory allows " + std::to_string(options_.max_memory) +
+          ": lower window-size, scale the video down, take the alpha out, or raise max-memory."};
+}
+
+Status Engine::drain() {
+  if (!configured())
+    return {Status::Code::not_configured, "configure the engine before draining it"};
+  const Clock::Span span(clock_, Clock::frames);
+  return flushed_if_it_throws([&]() -> Status {
+    schedule_->drain(&queue_);
+    // An old background says nothing of what comes after.
+    pace_.solve_next();
+    return {};
+  });
+}
+
+uint64_t Engine::bytes() const {
+  return configured() ? layout_.bytes - layout_.frame_bytes + frames_.bytes() : 0;
+}
+
+void Engine::set_foreground_threshold(double threshold) {
+  options_.foreground_threshold = threshold;
+  if (background_) background_->set_threshold(threshold);
+}
+
+void Engine::set_threads(int threads) {
+  if (workers_) workers_->ask_for(threads);
+}
+
+// What is needed for a picture of the frame in `slot`, without the frame.
+OutputTask Engine::task_of(Output output) {
+  OutputTask task = {};
+  // The background needs no frame, but rows of one are skipped over.
+  for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(0, c);
+  task.model = &background_->model();
+  task.output = output;
+  task.threshold = background_->report().foreground.threshold;
+  if (!(background_->fixed_threshold() > 0)) task.limits = background_->model().limits();
+  task.constant_alpha = 255;
+  return task;
+}
+
+// What is needed for the next frame's pictures.
+OutputTask Engine::next_task(Output output) {
+  const int index = frames_.size() - queue_.pending, slot = frames_.slot(index);
+  schedule_->show(index);
+  OutputTask task = task_of(output);
+  for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(slot, c);
+  task.alpha = frames_.alpha(slot);
+  task.constant_alpha = frames_.constant_alpha(slot);
+  return task;
+}
+
+void Engine::foreground(uint8_t* mask, uint8_t* residual) {
+  if (!ready()) return;
+  const Clock::Span span(clock_, Clock::frames);
+  flushed_if_it_throws([&] {
+    write_foreground(next_task(Output::mask), 0, frames_.window().pixels(), mask, residual);
+  });
+}
+
+bool Engine::write_background(const MutableImageView& out) {
+  if (!configured() || !background_->known()) return false;
+  schedule_->show_newest();
+  write_output(task_of(Output::background), out, 0, frames_.height());
+  return true;
+}
+
+void Engine::pop(Output output, const MutableImageView& out) {
+  if (!ready()) return;
+  const Clock::Span span(clock_, Clock::frames);
+  flushed_if_it_throws([&] {
+    const OutputTask task = next_task(output);
+    const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
+    // While the side thread works, its work has the pool.
+    if (workers_->side().idle()) {
+      const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
+                                            static_cast<size_t>(frames_.height()));
+      for_bands(workers_->pool(), frames_.height(), static_cast<int>(bands), write);
+    } else {
+      write(0, frames_.height(), 0);
+    }
+  });
+  --queue_.pending;
+  --queue_.ready;
+}
+
+}  // namespace qdmd

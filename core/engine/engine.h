@@ -1,0 +1,93 @@
+// The background separator: frames in, pictures out. No GStreamer.
+#pragma once
+
+#include <memory>
+
+#include "core/engine/engine_options.h"
+#include "core/engine/schedule.h"
+
+namespace qdmd {
+
+// Batch: push() collects window_size frames and solves; then pop() gives all of them back, in
+// order, each against its own L(t). drain() solves for a remainder, on the last window_size frames
+// seen (fewer where the stream is shorter). Live: each push() makes its frame ready, against the
+// newest model, extrapolated to the frame's time. A solve on the last window_size frames begins
+// every hop_size frames, earlier while the window fills up, and its work is spread over the frames
+// that follow (LivePlan). drain() begins a new window and keeps the background as it is until
+// there is a new model. Every frame pushed is popped exactly once, unless flush() drops it. Results
+// do not depend on the number of threads or on time. Not thread safe.
+// Throws std::bad_alloc where memory runs out. Frames that wait are lost then, as after flush(),
+// and the engine goes on with the next frame; after configure() it is not configured.
+class Engine {
+ public:
+  Engine() = default;
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  // Starts afresh with frames of width x height pixels.
+  Status configure(const EngineOptions& options, int width, int height);
+  bool configured() const { return schedule_ != nullptr; }
+  // Gives all memory and threads back; configure() comes next.
+  void close();
+
+  // Copies a frame in. Batch: solves when the window is full.
+  Status push(const ImageView& frame);
+  // True while pop() has a frame.
+  bool ready() const { return queue_.ready > 0; }
+  // Writes the next frame's picture. Call only while ready(); `out` has the configured size.
+  void pop(Output output, const MutableImageView& out);
+  // Of the frame that pop() gives next, width * height samples each: its mask, as Output::mask has
+  // it, and the lengths of its residuals in levels, at most 255. Call only while ready().
+  void foreground(uint8_t* mask, uint8_t* residual);
+  // Writes the newest background. Batch: that of the last frame that was solved for; live: that of
+  // the newest frame. False: there is none yet.
+  bool write_background(const MutableImageView& out);
+  // Makes every waiting frame ready. The frame after it belongs to a new window: time is broken.
+  Status drain();
+  // Drops all frames and forgets the window and the model.
+  void flush();
+
+  // Frames pushed and not popped.
+  int pending() const { return queue_.pending; }
+  uint64_t solves() const { return background_ ? background_->solves() : 0; }
+  SolveReport report() const { return background_ ? background_->report() : SolveReport(); }
+  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies, its
+  // own.
+  uint64_t bytes() const;
+
+  // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
+  void set_foreground_threshold(double threshold);
+  // While on, the background stays the picture that it was, and nothing is solved; only the first
+  // model is made all the same. Batch: decided when a window begins.
+  void set_freeze(bool freeze) { freeze_ = freeze; }
+  // Seconds that a frame may take on average; 0: no limit. Solves are given the effort that fits,
+  // at most what the options say (TimeBudget), and pictures then depend on time.
+  void set_time_budget(double seconds_per_frame) { pace_.set_budget(seconds_per_frame); }
+  const TimeBudget& time_budget() const { return pace_.budget(); }
+  // Where the caller charges what a frame takes beside push() and pop(), for instance to be
+  // converted: it counts.
+  Clock& clock() { return clock_; }
+  // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
+  void set_threads(int threads);
+
+ private:
+  OutputTask task_of(Output output);
+  OutputTask next_task(Output output);
+  Status alpha_refused() const;
+  template <typename Action>
+  auto flushed_if_it_throws(Action action);
+
+  EngineOptions options_;
+  EngineLayout layout_;
+  Clock clock_;
+  Pace pace_{&clock_};
+  bool freeze_ = false;
+  FrameStore frames_;
+  std::unique_ptr<Background> background_;
+  std::unique_ptr<Schedule> schedule_;
+  Queue queue_;
+  // The last member: its threads end before what they work on.
+  std::unique_ptr<Workers> workers_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,79 @@
+#include "core/engine/engine_options.h"
+
+#include "core/learn/learner.h"
+#include "core/parallel/workers.h"
+
+namespace qdmd {
+namespace {
+
+LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
+  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  return LivePlan(options.window_size, options.hop_size, PlaneSlots::bytes(1, pixels),
+                  learner.in_one_piece());
+}
+
+uint64_t saturating_sum(uint64_t a, uint64_t b) {
+  return __builtin_add_overflow(a, b, &a) ? UINT64_MAX : a;
+}
+
+}  // namespace
+
+LivePlan plan_of(const EngineOptions& options, int width, int height) {
+  return plan_for(options, *Learner::make(options, width, height), width, height);
+}
+
+EngineLayout layout_of(const EngineOptions& options, int width, int height) {
+  const auto learner = Learner::make(options, width, height);
+  const bool live = options.mode == Mode::live;
+  EngineLayout layout;
+  layout.sample_step = learner->sample_steps().front();
+  layout.capacity = options.window_size;
+  if (live) layout.capacity += plan_for(options, *learner, width, height).most_late_frames();
+  layout.frame_bytes = FrameStore::bytes(layout.capacity, width, height, learner->contents());
+  layout.bytes = saturating_sum(
+      saturating_sum(layout.frame_bytes, options.caller_bytes),
+      learner->bytes(options.window_size, layout.capacity, live, Workers::count(options.threads)));
+  return layout;
+}
+
+std::string describe(const EngineOptions& options, int width, int height) {
+  return std::to_string(options.window_size) + " frames of " + std::to_string(width) + "x" +
+         std::to_string(height);
+}
+
+Status check_options(const EngineOptions& options, int width, int height) {
+  using Code = Status::Code;
+  if (width < 1 || height < 1) return {Code::invalid_options, "a frame needs at least one pixel"};
+  if (options.window_size < EngineOptions::kMinWindow ||
+      options.window_size > EngineOptions::kMaxWindow)
+    return {Code::invalid_options, "window-size must be 2 to 2048 frames"};
+  if (options.hop_size < 0 || options.hop_size > options.window_size)
+    return {Code::invalid_options, "hop-size must be 0 (a quarter of the window) to window-size"};
+  if (options.iterations < 1 || options.iterations > EngineOptions::kMaxIterations)
+    return {Code::invalid_options, "iterations must be 1 to 20"};
+  if (options.sample_step < 0 || options.sample_step > EngineOptions::kMaxSampleStep)
+    return {Code::invalid_options, "sample-step must be 0 (chosen) to 64"};
+  if (options.dmd.rank < 0 || !(options.dmd.omega_threshold >= 0) ||
+      !(options.foreground_threshold >= 0))
+    return {Code::invalid_options,
+            "rank, omega-threshold and foreground-threshold must not be negative"};
+  if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
+    return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
+  const EngineLayout layout = layout_of(options, width, height);
+  if (layout.bytes > options.max_memory)
+    return {Code::too_much_memory,
+            "A window-size of " + describe(options, width, height) + " needs " +
+                std::to_string(layout.bytes) + " bytes (" + std::to_string(layout.frame_bytes) +
+                " for its frames) and max-memory allows " + std::to_string(options.max_memory) +
+                ": lower window-size, scale the video down, or raise max-memory."};
+  const uint64_t solver = Learner::make(options, width, height)->solver_bytes(options.window_size);
+  if (solver > options.max_memory)
+    return {Code::too_much_memory,
+            "solver=adjoint with a window-size of " + describe(options, width, height) +
+                " needs about " + std::to_string(solver) + " bytes and max-memory allows " +
+                std::to_string(options.max_memory) +
+                ": use solver=gram, lower window-size, or scale the video down."};
+  return {};
+}
+
+}  // namespace qdmd

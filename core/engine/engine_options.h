@@ -1,0 +1,49 @@
+// What the engine is asked for, and why it refuses.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/status.h"
+#include "core/engine/live_plan.h"
+#include "core/learn/method.h"
+
+namespace qdmd {
+
+enum class Mode {
+  batch,  // frames come out a window at a time, each against its own window's model
+  live    // each frame comes out at once, against the newest model
+};
+
+struct EngineOptions : LearnOptions {
+  Mode mode = Mode::batch;
+  int window_size = 100;                    // m, kMinWindow .. kMaxWindow frames
+  int hop_size = 0;                         // frames between solves in live mode, up to m; 0: m / 4
+  double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
+  uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
+  uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too
+  int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
+
+  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = 256;
+};
+
+// What options and frame size come to.
+struct EngineLayout {
+  int capacity = 0;  // frames that are kept: the window's, in live mode also those that arrive
+                     // while one is solved
+  int sample_step = 1;
+  uint64_t frame_bytes = 0;  // of the frames that are kept, with all that belongs to them
+  uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
+};
+EngineLayout layout_of(const EngineOptions& options, int width, int height);
+
+// Of live mode, for frames of that size.
+LivePlan plan_of(const EngineOptions& options, int width, int height);
+
+// Ok where an engine can be configured so.
+Status check_options(const EngineOptions& options, int width, int height);
+
+// "100 frames of 640x480".
+std::string describe(const EngineOptions& options, int width, int height);
+
+}  // namespace qdmd

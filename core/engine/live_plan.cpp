@@ -1,0 +1,91 @@
+#include "core/engine/live_plan.h"
+
+#include <algorithm>
+
+namespace qdmd {
+namespace {
+
+// Frames of a group: they fill a register tile of the Gram kernel, and the window is read once for
+// all of them.
+constexpr int kMostGroup = 16;
+
+// Bytes of the window that a slice reads: what memory delivers in a few milliseconds.
+constexpr uint64_t kSliceBytes = uint64_t{32} << 20;
+
+// The snapshots of a solve stay in memory until its pictures are there: more slices would be
+// lighter but want more frames.
+constexpr int kMostBuildSlices = 8;
+
+// Frames that a solve in one piece may take: about a second, and the frames that it keeps in
+// memory.
+constexpr int kLongestPiece = 24;
+
+int ceil_divide(int64_t value, int64_t by) { return static_cast<int>((value + by - 1) / by); }
+
+}  // namespace
+
+LivePlan::LivePlan(int window_size, int hop_size, uint64_t frame_bytes, bool in_one_piece)
+    : window_size_(window_size),
+      hop_size_(std::clamp(hop_size > 0 ? hop_size : window_size / 4, 1, window_size)),
+      frame_bytes_(frame_bytes),
+      in_one_piece_(in_one_piece) {
+  restart(1);
+}
+
+int LivePlan::slices(int64_t snapshots) const {
+  if (in_one_piece_) return 1;
+  const uint64_t bytes = frame_bytes_ * static_cast<uint64_t>(snapshots);
+  return static_cast<int>(
+      std::clamp<uint64_t>((bytes + kSliceBytes - 1) / kSliceBytes, 1, kMostGroup));
+}
+
+int LivePlan::largest_group() const {
+  return ceil_divide(hop_size_, ceil_divide(hop_size_, kMostGroup));
+}
+
+int LivePlan::most_late_frames() const {
+  if (at_once()) return 0;
+  if (in_one_piece_) return std::min(kLongestPiece, hop_size_) - 1;
+  return std::min(most_slices(), largest_group()) - 1 +
+         std::min({most_slices(), kMostBuildSlices, hop_size_});
+}
+
+void LivePlan::restart(int first_solve) {
+  frames_ = 0;
+  start_ = 0;
+  plan(first_solve);
+}
+
+void LivePlan::plan(int64_t next_solve) {
+  solve_at_ = next_solve;
+  groups_ = ceil_divide(solve_at_ - start_, kMostGroup);
+  groups_done_ = 0;
+}
+
+LivePlan::Step LivePlan::next() {
+  ++frames_;
+  const auto group_end = [this](int64_t group) {
+    return start_ + (solve_at_ - start_) * group / groups_;
+  };
+  Step step;
+  if (frames_ < group_end(groups_done_ + 1)) return step;
+  step.group = static_cast<int>(group_end(groups_done_ + 1) - group_end(groups_done_));
+  ++groups_done_;
+  step.solve = groups_done_ == groups_;
+  if (step.solve) {
+    start_ = solve_at_;
+    // A window that is filling up is solved as it grows: its first frames say little.
+    plan(start_ + std::clamp<int64_t>(frames_ / 2, 1, hop_size_));
+  }
+  const int64_t size = std::min<int64_t>(frames_, window_size_);
+  const auto until_next = static_cast<int>(group_end(groups_done_ + 1) - frames_);
+  // A hop of the warm-up may be a larger group, but there are no frames to spare for it.
+  step.gram_slices = std::min({slices(size), until_next, largest_group()});
+  if (step.solve) {
+    const int most = in_one_piece_ ? kLongestPiece : std::min(slices(size), kMostBuildSlices);
+    step.build_slices = std::min(most, static_cast<int>(solve_at_ - start_));
+  }
+  return step;
+}
+
+}  // namespace qdmd

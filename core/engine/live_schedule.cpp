@@ -1,0 +1,140 @@
+#include "core/engine/live_schedule.h"
+
+#include <algorithm>
+
+namespace qdmd {
+
+LiveSchedule::LiveSchedule(const Stage& stage, const LivePlan& plan)
+    : Schedule(stage), plan_(plan) {}
+
+bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
+  const bool frozen = freeze && background().known();
+  if (frozen)
+    pace().solve_next();
+  else
+    settle();
+  if (frozen || start_new_window_) {
+    const bool has_model = background().known();
+    stop();
+    if (has_model) background().hold(time(), Background::State::held);
+    frames().clear();
+    begin_window(has_model);
+  }
+  if (!frames().append(frame)) return false;
+  if (!frozen) begin_work();
+  if (background().state() == Background::State::learnt)
+    background().follow_light(frames().window().newest_slot());
+  pace().count_frame();
+  queue->pending = queue->ready = 1;
+  return true;
+}
+
+// Publishes what is due.
+void LiveSchedule::settle() {
+  if (piece_due_ && plan_.frames() + 1 < *piece_due_) return;
+  piece_due_.reset();
+  wait();
+  publish();
+}
+
+void LiveSchedule::publish() {
+  if (!finished_) return;
+  model_start_ = *finished_;
+  finished_.reset();
+  background().publish();
+}
+
+// What comes with the newest frame.
+void LiveSchedule::begin_work() {
+  LivePlan::Step step = plan_.next();
+  const bool first = !background().known();
+  if (step.solve) step.solve = pace().next_stretch(&background()) || first;
+  const bool at_once = plan_.at_once() || first;
+  // Frames that are kept for a solve in progress are no part of the window.
+  const int size =
+      static_cast<int>(std::min<int64_t>({plan_.frames(), plan_.window_size(), frames().size()}));
+  const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
+  const int64_t first_frame = plan_.frames() - size;
+  if (plan_.in_one_piece()) {
+    if (!step.solve) return;
+    background().begin(span);
+    build_ = Build{1, 0, first_frame};
+    if (!at_once) piece_due_ = plan_.frames() + step.build_slices;
+  } else if (step.group > 0) {
+    group_ =
+        Group{span, step.group, step.gram_slices, 0, step.solve, step.build_slices, first_frame};
+  }
+  if (group_ || build_) run(at_once);
+}
+
+void LiveSchedule::run(bool at_once) {
+  fixed_threshold_ = background().fixed_threshold();
+  if (!at_once) {
+    side().start([this] { work(); });
+    return;
+  }
+  while (group_ || build_) work();
+  publish();
+}
+
+// One frame's share. Pictures come first: the solve after them needs their place.
+void LiveSchedule::work() {
+  if (build_) {
+    background().build({build_->done, build_->slices});
+    if (++build_->done == build_->slices) {
+      background().finish(fixed_threshold_);
+      finished_ = build_->first_frame;
+      build_.reset();
+    }
+  }
+  if (group_) {
+    background().learner().add(group_->span, group_->frames, {group_->done, group_->slices});
+    if (++group_->done < group_->slices) return;
+    if (group_->solve) {
+      background().begin(group_->span);
+      build_ = Build{group_->build_slices, 0, group_->first_frame};
+    }
+    group_.reset();
+  }
+}
+
+void LiveSchedule::drain(Queue* queue) {
+  queue->ready = queue->pending;
+  start_new_window_ = true;
+}
+
+void LiveSchedule::stop() noexcept {
+  side().abandon();
+  group_.reset();
+  build_.reset();
+  piece_due_.reset();
+  finished_.reset();
+}
+
+// The first solve comes with its first frame, or, where there is a model, after a hop: a model of
+// many frames is better than one of few.
+void LiveSchedule::begin_window(bool has_model) {
+  plan_.restart(has_model ? plan_.hop_size() : 1);
+  start_new_window_ = false;
+}
+
+void LiveSchedule::restart() {
+  stop();
+  frames().clear();
+  begin_window(false);
+}
+
+// The newest frame's time in the model in use. Where the light is followed, it ends with the
+// model's window; else, where solves are left out, with the frames for which the plan has the
+// model: a mode does not go on to grow or fade.
+double LiveSchedule::time() const {
+  int last = background().report().window_frames - 1;
+  if (!background().learner().follows_light()) last += plan_.hop_size() + plan_.most_late_frames();
+  return static_cast<double>(std::min<int64_t>(plan_.frames() - 1 - model_start_, last));
+}
+
+void LiveSchedule::show(int) { background().model().set_time(time()); }
+
+void LiveSchedule::show_newest() { show(0); }
+
+}  // namespace qdmd

@@ -1,0 +1,61 @@
+// Each frame leaves at once, against the newest model.
+#pragma once
+
+#include <optional>
+
+#include "core/engine/live_plan.h"
+#include "core/engine/schedule.h"
+
+namespace qdmd {
+
+// What the plan has for a frame runs on the side thread until the next frame comes, or at once
+// where it is little or where there is no model yet. A solve in one piece goes on over several
+// frames. Models are therefore published at fixed frames. After a break the background is held
+// until there is a new model.
+class LiveSchedule : public Schedule {
+ public:
+  LiveSchedule(const Stage& stage, const LivePlan& plan);
+
+  bool push(const ImageView& frame, bool freeze, Queue* queue) override;
+  void drain(Queue* queue) override;
+  void restart() override;
+  void show(int index) override;
+  void show_newest() override;
+
+ private:
+  // A group of frames on its way into the Gram matrix.
+  struct Group {
+    SnapshotRange span;
+    int frames, slices, done = 0;
+    bool solve;
+    int build_slices;
+    int64_t first_frame;  // of the span, counted from the plan's restart
+  };
+  // Pictures of modes in the making.
+  struct Build {
+    int slices, done = 0;
+    int64_t first_frame;
+  };
+
+  void settle();
+  void begin_work();
+  void begin_piece(const LivePlan::Step& step, const SnapshotRange& span, bool at_once);
+  void run(bool at_once);
+  void work();
+  void publish();
+  void stop() noexcept;
+  void begin_window(bool has_model);
+  double time() const;
+
+  LivePlan plan_;
+  bool start_new_window_ = false;
+  int64_t model_start_ = 0;  // the frame at time 0 of the model in use, counted like first_frame
+  // The side thread's while it works.
+  std::optional<Group> group_;
+  std::optional<Build> build_;
+  std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
+  std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
+  double fixed_threshold_ = 0;        // of the foreground, as it was when the work began
+};
+
+}  // namespace qdmd

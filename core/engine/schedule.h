@@ -1,0 +1,65 @@
+// When frames are learnt from, and when they may leave: what batch and live differ in.
+#pragma once
+
+#include "core/base/image_view.h"
+#include "core/base/status.h"
+#include "core/engine/background.h"
+#include "core/engine/pace.h"
+#include "core/frames/frame_store.h"
+#include "core/parallel/workers.h"
+
+namespace qdmd {
+
+// What a schedule works with; its engine owns all of it.
+struct Stage {
+  FrameStore* frames;
+  Background* background;
+  Workers* workers;
+  Pace* pace;
+  Clock* clock;
+};
+
+// Frames that were pushed and wait to be popped: the newest `pending` of the store. The oldest
+// `ready` of them may leave.
+struct Queue {
+  int pending = 0, ready = 0;
+};
+
+// Frames go in, and are ready with the background of their time. May throw std::bad_alloc; what
+// waits is lost then, and restart() comes next.
+class Schedule {
+ public:
+  explicit Schedule(const Stage& stage) : stage_(stage) {}
+  virtual ~Schedule() = default;
+  Schedule(const Schedule&) = delete;
+  Schedule& operator=(const Schedule&) = delete;
+
+  // Takes a frame in. freeze: the background is held once there is one. False: the frame has alpha
+  // for which there is no room (FrameStore::append).
+  virtual bool push(const ImageView& frame, bool freeze, Queue* queue) = 0;
+  // All that waits becomes ready. The next frame begins a new window.
+  virtual void drain(Queue* queue) = 0;
+  // Drops the work that is under way, and all frames. The background is forgotten, too.
+  virtual void restart() = 0;
+  // Sets the model to the time, and the light, of frame `index` of the store.
+  virtual void show(int index) = 0;
+  // The same for the newest background.
+  virtual void show_newest() = 0;
+
+ protected:
+  FrameStore& frames() const { return *stage_.frames; }
+  Background& background() const { return *stage_.background; }
+  Workers& workers() const { return *stage_.workers; }
+  SideThread& side() const { return stage_.workers->side(); }
+  Pace& pace() const { return *stage_.pace; }
+  // For the side thread's work, whose time it charges itself. Throws what that threw.
+  void wait() const {
+    const Clock::Span span(*stage_.clock, Clock::waiting);
+    side().finish();
+  }
+
+ private:
+  Stage stage_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,139 @@
+#include "core/foreground/foreground.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "core/passes/planes.h"
+#include "core/passes/residual.h"
+
+namespace qdmd {
+namespace {
+
+// L(t) of one run of pixels.
+struct BackgroundRun {
+  alignas(64) uint8_t level[3][kMaxRun];
+  uint8_t* const rows[3] = {level[0], level[1], level[2]};
+};
+
+}  // namespace
+
+double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
+
+ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
+                                           double fixed_threshold) {
+  constexpr int kFrames = 12;
+  constexpr size_t kRunsPerFrame = 24;
+  constexpr double kBinsPerLevel = 8;
+  // The largest quaternion norm of a difference is 255 sqrt(3).
+  std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{}, beyond_limits{};
+  const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
+  uint64_t total = 0;
+  BackgroundRun background;
+  const int frames = std::min(kFrames, snapshots.size());
+  const size_t runs = (snapshots.pixels() + kMaxRun - 1) / kMaxRun;
+  const size_t step = (runs + kRunsPerFrame - 1) / kRunsPerFrame;
+  for (int i = 0; i < frames; ++i) {
+    const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
+    model.set_time(t);
+    // Other frames look at other runs.
+    for (size_t run = static_cast<size_t>(i) % std::max<size_t>(step, 1); run < runs; run += step) {
+      const size_t first = run * kMaxRun;
+      const size_t count = std::min(kMaxRun, snapshots.pixels() - first);
+      model.evaluate(first, count, background.rows);
+      for (size_t p = 0; p < count; ++p) {
+        int squared = 0;
+        for (int c = 0; c < kChannels; ++c) {
+          const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
+          squared += difference * difference;
+        }
+        const double norm = std::sqrt(squared);
+        const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
+        ++histogram[bin];
+        if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
+      }
+      total += count;
+    }
+  }
+
+  ForegroundStatistics statistics;
+  uint64_t below = 0;
+  size_t quartile = 0;
+  while (quartile + 1 < histogram.size() && 4 * (below + histogram[quartile]) < total)
+    below += histogram[quartile++];
+  statistics.noise = static_cast<double>(quartile) / kBinsPerLevel / 1.1012;
+  statistics.threshold =
+      fixed_threshold > 0 ? fixed_threshold : automatic_threshold(statistics.noise);
+  uint64_t above = 0;
+  for (size_t bin = 0; bin < histogram.size(); ++bin)
+    if (static_cast<double>(bin) / kBinsPerLevel > statistics.threshold)
+      above += beyond_limits[bin];
+  statistics.ratio = total > 0 ? static_cast<double>(above) / static_cast<double>(total) : 0;
+  return statistics;
+}
+
+void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
+                  int row_count) {
+  const bool masked = task.output == Output::mask || task.output == Output::cutout;
+  BackgroundRun background;
+  alignas(64) uint8_t made[3][kMaxRun], mask[kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun];
+  if (out.alpha)
+    std::memset(constant_alpha, out.alpha_is_padding ? 255 : task.constant_alpha, kMaxRun);
+  const auto image_width = static_cast<size_t>(out.width);
+  size_t rows = static_cast<size_t>(row_count), width = image_width;
+  // Rows without gaps are one long row.
+  if (out.row_stride == out.pixel_stride * out.width) width *= std::exchange(rows, 1);
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t left = 0; left < width; left += kMaxRun) {
+      const size_t count = std::min(kMaxRun, width - left);
+      const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
+      task.model->evaluate(first, count, background.rows);
+      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      if (masked)
+        foreground_mask(x, background.rows, count, task.threshold,
+                        task.limits ? task.limits + first : nullptr, mask);
+      const uint8_t* channels[3];
+      for (int c = 0; c < kChannels; ++c) {
+        channels[c] = made[c];
+        switch (task.output) {
+          case Output::background:
+            channels[c] = background.level[c];
+            break;
+          case Output::foreground:
+            absolute_residual(x[c], background.level[c], count, made[c]);
+            break;
+          case Output::mask:
+            channels[c] = mask;
+            break;
+          case Output::cutout:
+            apply_mask(x[c], mask, count, made[c]);
+            break;
+        }
+      }
+      const uint8_t* own = constant_alpha;
+      if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
+      if (task.output == Output::cutout && out.alpha && !out.alpha_is_padding) {
+        apply_mask(own, mask, count, alpha);
+        own = alpha;
+      }
+      join_channels(channels, own, count, out, first_row + static_cast<int>(row),
+                    static_cast<int>(left));
+    }
+}
+
+void write_foreground(const OutputTask& task, size_t first, size_t count, uint8_t* mask,
+                      uint8_t* residual) {
+  BackgroundRun background;
+  for (size_t done = 0; done < count; done += kMaxRun) {
+    const size_t from = first + done, run = std::min(kMaxRun, count - done);
+    task.model->evaluate(from, run, background.rows);
+    const uint8_t* const x[3] = {task.x[0] + from, task.x[1] + from, task.x[2] + from};
+    foreground_mask(x, background.rows, run, task.threshold,
+                    task.limits ? task.limits + from : nullptr, mask + done);
+    residual_norm(x, background.rows, run, residual + done);
+  }
+}
+
+}  // namespace qdmd

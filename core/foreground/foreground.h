@@ -1,0 +1,54 @@
+// Foreground statistics of a solved window, and the four pictures that users can ask for.
+#pragma once
+
+#include "core/base/image_view.h"
+#include "core/model/background_model.h"
+
+namespace qdmd {
+
+enum class Output {
+  background,  // L(t)
+  foreground,  // |x - L| per channel
+  mask,        // white where |x - L| exceeds the threshold, else black
+  cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
+};
+
+struct ForegroundStatistics {
+  double noise = 0;      // standard deviation of one channel, grey levels
+  double threshold = 0;  // quaternion norm in grey levels above which a pixel is foreground
+  double ratio = 0;      // share of the sampled pixels above it and their own limits, 0 .. 1
+};
+
+// The threshold that suits a noise level: max(4 sqrt(3) sigma, 18) grey levels of quaternion norm.
+double automatic_threshold(double noise);
+
+// Looks at a sample of the window's residuals |x_t - L(t)| (quaternion norm). The noise comes from
+// their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
+// for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
+// `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
+// Leaves the model's time at the last sampled snapshot.
+ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
+                                           double fixed_threshold);
+
+// One frame of a window and what its pictures are made of.
+struct OutputTask {
+  const uint8_t* x[3];           // the frame's planes
+  const BackgroundModel* model;  // at the frame's time
+  Output output;
+  double threshold;        // quaternion norm, grey levels
+  const uint8_t* limits;   // of each pixel, where that is more; or null
+  const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
+  uint8_t constant_alpha;  // this
+};
+
+// Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write
+// different rows.
+void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
+                  int row_count);
+
+// The mask of pixels first .. first + count - 1, as Output::mask has it, and the lengths of their
+// residuals in levels, at most 255. The task's output does not matter.
+void write_foreground(const OutputTask& task, size_t first, size_t count, uint8_t* mask,
+                      uint8_t* residual);
+
+}  // namespace qdmd

@@ -1,0 +1,24 @@
+// Boxes around what moves, from a mask.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace qdmd {
+
+struct Region {
+  int x = 0, y = 0, width = 0, height = 0;  // pixels
+  int area = 0;                             // masked pixels inside
+  double mean_residual = 0;                 // of these, levels
+};
+
+// The regions of a picture of width x height pixels, the largest first. mask: 255 where foreground,
+// else 0; residual: levels. Parts nearer to each other than about 1/60 of the short side are one
+// region, and so are regions whose boxes overlap. Regions of fewer than least_area pixels are left
+// out; 0: 1/2000 of the picture, at least 4. At most kMostRegions. Throws std::bad_alloc.
+constexpr size_t kMostRegions = 64;
+std::vector<Region> find_regions(const uint8_t* mask, const uint8_t* residual, int width,
+                                 int height, int least_area);
+
+}  // namespace qdmd

@@ -1,0 +1,92 @@
+#include "core/frames/frame_store.h"
+
+#include <limits>
+
+#include "core/passes/planes.h"
+#include "core/passes/sampling.h"
+
+namespace qdmd {
+namespace {
+
+size_t pixels_of(int width, int height) {
+  return static_cast<size_t>(width) * static_cast<size_t>(height);
+}
+
+// What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
+uint8_t first_alpha(const ImageView& frame) {
+  return frame.alpha && !frame.alpha_is_padding ? *frame.alpha : uint8_t{255};
+}
+
+}  // namespace
+
+FrameStore::FrameStore(int capacity, int width, int height, const FrameContents& contents,
+                       uint64_t most_bytes)
+    : width_(width),
+      height_(height),
+      sample_step_(contents.sample_step),
+      most_bytes_(most_bytes),
+      planes_(capacity, pixels_of(width, height)),
+      constant_alpha_(static_cast<size_t>(capacity), 255),
+      varies_(static_cast<size_t>(capacity), 0) {
+  if (sample_step_ > 1) samples_ = PlaneSlots(capacity, sample_count(width, height, sample_step_));
+  if (contents.cells_along > 0) {
+    grid_ = Grid(width, height, contents.cells_along);
+    cells_ = GridFrames(grid_, capacity);
+  }
+}
+
+uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
+  uint64_t bytes = PlaneSlots::bytes(capacity, pixels_of(width, height));
+  uint64_t beside = 2 * static_cast<uint64_t>(capacity);
+  if (contents.sample_step > 1)
+    beside += PlaneSlots::bytes(capacity, sample_count(width, height, contents.sample_step));
+  if (contents.cells_along > 0)
+    beside += GridFrames::bytes(Grid(width, height, contents.cells_along), capacity);
+  if (__builtin_add_overflow(bytes, beside, &bytes)) return std::numeric_limits<uint64_t>::max();
+  return bytes;
+}
+
+uint64_t FrameStore::bytes() const {
+  return planes_.bytes() + samples_.bytes() + cells_.bytes() + (alpha_ ? alpha_bytes() : 0) +
+         constant_alpha_.size() + varies_.size();
+}
+
+bool FrameStore::append(const ImageView& frame) {
+  const int slot = planes_.append();
+  ++frames_taken_;
+  uint8_t* const planes[3] = {planes_.plane(slot, 0), planes_.plane(slot, 1),
+                              planes_.plane(slot, 2)};
+  const uint8_t alpha = first_alpha(frame);
+  const bool constant = split_channels(frame, 0, height_, alpha, planes);
+  varies_[static_cast<size_t>(slot)] = !constant;
+  constant_alpha_[static_cast<size_t>(slot)] = alpha;
+  if (!constant && !keep_alpha(slot, frame)) return false;
+  if (sample_step_ > 1) {
+    samples_.pad(slot);
+    for (int c = 0; c < kChannels; ++c)
+      take_samples(planes[c], width_, height_, sample_step_, samples_.plane(slot, c));
+  }
+  if (cells_.cells() > 0)
+    for (int c = 0; c < kChannels; ++c) cell_means(grid_, planes[c], cells_.plane(slot, c));
+  return true;
+}
+
+bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
+  if (!alpha_) {
+    if (bytes_with_alpha() > most_bytes_) return false;
+    // Without touching it.
+    alpha_ = std::make_unique_for_overwrite<uint8_t[]>(alpha_bytes());
+  }
+  uint8_t* to = alpha_of(slot);
+  for (int row = 0; row < height_; ++row) {
+    const uint8_t* from = frame.alpha + row * frame.row_stride;
+    for (int col = 0; col < width_; ++col, from += frame.pixel_stride) *to++ = *from;
+  }
+  return true;
+}
+
+const uint8_t* FrameStore::alpha(int slot) const {
+  return varies_[static_cast<size_t>(slot)] ? alpha_of(slot) : nullptr;
+}
+
+}  // namespace qdmd

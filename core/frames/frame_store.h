@@ -1,0 +1,82 @@
+// A window's frames, with all that belongs to a frame.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/image_view.h"
+#include "core/gram/window.h"
+#include "core/passes/grid.h"
+
+namespace qdmd {
+
+// What is kept of each frame beside its planes.
+struct FrameContents {
+  int sample_step = 1;  // every k-th pixel in x and y once more, side by side; 1: none
+  int cells_along = 0;  // means over the cells of a grid, so many along the short side; 0: none
+};
+
+// The newest `capacity` frames of width x height pixels: planes, samples, cells, alpha. Everything
+// of a frame is in the slot that append() names.
+class FrameStore {
+ public:
+  FrameStore() = default;
+  // Takes all memory but that for alpha that varies, which append() may take once, `most_bytes` in
+  // all at most. Throws std::bad_alloc.
+  FrameStore(int capacity, int width, int height, const FrameContents& contents,
+             uint64_t most_bytes = UINT64_MAX);
+
+  // The bytes that such a store takes, without alpha that varies.
+  static uint64_t bytes(int capacity, int width, int height, const FrameContents& contents);
+  // Those that it has taken.
+  uint64_t bytes() const;
+  // With alpha that varies.
+  uint64_t bytes_with_alpha() const { return bytes() + (alpha_ ? 0 : alpha_bytes()); }
+
+  // Takes a copy of the frame, in place of the oldest where the store is full. False: its alpha
+  // varies, which needs more than `most_bytes`. Throws std::bad_alloc. The newest frame is then
+  // undefined.
+  bool append(const ImageView& frame);
+  // Forgets all frames.
+  void clear() { planes_.clear(); }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int capacity() const { return planes_.capacity(); }
+  // Frames held, in the order in which they came.
+  const Window& window() const { return planes_; }
+  int size() const { return planes_.size(); }
+  int slot(int index) const { return planes_.slot(index); }
+  // Since it was made, those that it no longer holds included.
+  uint64_t frames_taken() const { return frames_taken_; }
+
+  // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.
+  const PlaneSlots& samples() const { return sample_step_ > 1 ? samples_ : planes_; }
+  const Grid& grid() const { return grid_; }
+  const GridFrames& cells() const { return cells_; }
+  // Samples of alpha in row order, or null where all are constant_alpha().
+  const uint8_t* alpha(int slot) const;
+  uint8_t constant_alpha(int slot) const { return constant_alpha_[static_cast<size_t>(slot)]; }
+
+ private:
+  uint64_t alpha_bytes() const {
+    return static_cast<uint64_t>(capacity()) * static_cast<uint64_t>(planes_.pixels());
+  }
+  uint8_t* alpha_of(int slot) const {
+    return alpha_.get() + static_cast<size_t>(slot) * planes_.pixels();
+  }
+  bool keep_alpha(int slot, const ImageView& frame);
+
+  int width_ = 0, height_ = 0, sample_step_ = 1;
+  uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
+  Window planes_;
+  PlaneSlots samples_;
+  Grid grid_;
+  GridFrames cells_;
+  // Video with alpha is nearly always opaque: its planes are kept only once one varies.
+  std::unique_ptr<uint8_t[]> alpha_;
+  std::vector<uint8_t> constant_alpha_, varies_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,30 @@
+#include "core/learn/learner.h"
+
+#include "core/learn/gram_learner.h"
+#include "core/learn/robust/robust_learner.h"
+
+namespace qdmd {
+
+std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, int height) {
+  if (options.method == Method::robust)
+    return std::make_unique<RobustLearner>(options, width, height);
+  return std::make_unique<GramLearner>(options, width, height);
+}
+
+std::span<const char* const> options_without_effect(Method method) {
+  static constexpr const char* kOfQdmd[] = {"iterations"};
+  static constexpr const char* kOfDmd[] = {"iterations", "solver"};
+  // What the paper fits to the first frame depends on what stood there.
+  static constexpr const char* kOfRobust[] = {"amplitude"};
+  switch (method) {
+    case Method::qdmd:
+      return kOfQdmd;
+    case Method::dmd:
+      return kOfDmd;
+    case Method::robust:
+      break;
+  }
+  return kOfRobust;
+}
+
+}  // namespace qdmd

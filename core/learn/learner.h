@@ -1,0 +1,91 @@
+// From frames to a model of their background.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/channels.h"
+#include "core/base/clock.h"
+#include "core/dmd/options.h"
+#include "core/frames/frame_store.h"
+#include "core/learn/method.h"
+#include "core/model/background_model.h"
+#include "core/parallel/pool.h"
+#include "core/passes/bands.h"
+
+namespace qdmd {
+
+// About one solve.
+struct SolveFacts {
+  DmdSummary dmd;
+  int window_frames = 0;
+  int sample_step = 1;  // the decomposition saw every k-th pixel in x and y
+  int iterations = 1;
+  // Seconds in the Gram matrix since the solve before, and in the solve.
+  double gram_time = 0, solve_time = 0;
+};
+
+// Where a learner works.
+struct LearnerRoom {
+  const FrameStore* frames;  // made for the learner's contents()
+  int window_size;           // snapshots of a solve, at most
+  bool keep_pictures;        // models outlive their window's frames
+  Pool* pool;
+  Clock* clock;
+};
+
+// One method. A solve is add() for groups of frames as they come, each in slices of pixels;
+// decompose(); build() in slices. One step at a time, from any thread; the pool's threads help.
+// May throw std::bad_alloc; what was under way is lost then.
+class Learner {
+ public:
+  // That of options.method, for frames of width x height pixels. Takes no memory for them yet.
+  static std::unique_ptr<Learner> make(const LearnOptions& options, int width, int height);
+  virtual ~Learner() = default;
+
+  // ---- What it needs ----
+
+  // Of each frame, beside its planes.
+  virtual FrameContents contents() const = 0;
+  // The steps that it can sample pixels with, the finest first: it begins with that.
+  virtual std::vector<int> sample_steps() const = 0;
+  // True: a solve is one piece of work, add() does nothing and build() has one slice.
+  virtual bool in_one_piece() const = 0;
+  // Bytes beside the frames, for as many as a FrameStore of `capacity` has, with its models: the
+  // most that are taken at once.
+  virtual uint64_t bytes(int window_size, int capacity, bool keep_pictures, int threads) const = 0;
+  // Estimate of the bytes of a solver that works on pixels; 0: it works on the Gram matrix.
+  virtual uint64_t solver_bytes(int window_size) const = 0;
+
+  // ---- Solves ----
+
+  // Before all others. Takes memory.
+  virtual void begin(const LearnerRoom& room) = 0;
+  // Forgets what earlier windows showed of the background.
+  virtual void forget() {}
+  // Of the solves to come: one of sample_steps(). Not while one runs.
+  virtual void set_sample_step(int) {}
+
+  // The inner products of the newest `frames` snapshots of `span` with all of it. Slices of a group
+  // come in order.
+  virtual void add(const SnapshotRange& span, int frames, Slice slice) = 0;
+  // Once all snapshots were added. They stay as they are until build() is done and, unless pictures
+  // are kept, until the next solve.
+  virtual void decompose(const SnapshotRange& snapshots) = 0;
+  // Makes `model` the snapshots' background; slices come in order.
+  virtual void build(Slice slice, BackgroundModel* model) = 0;
+  // Of the newest model that was built whole.
+  virtual SolveFacts facts() const = 0;
+  // That model is now the one in use.
+  virtual void publish() {}
+
+  // ---- Light ----
+
+  // True where the background in use is to have the light() of each frame.
+  virtual bool follows_light() const { return false; }
+  // Of the frame in `slot`, over the background in use.
+  virtual Gain light(int /*slot*/) const { return kSameLight; }
+};
+
+}  // namespace qdmd

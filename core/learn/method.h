@@ -1,0 +1,29 @@
+// How a window's background is found, and what that is asked for.
+#pragma once
+
+#include <span>
+
+#include "core/dmd/options.h"
+
+namespace qdmd {
+
+enum class Method {
+  qdmd,   // quaternion DMD, the paper's Algorithm 2
+  dmd,    // exact DMD of each colour channel by itself, the paper's Algorithm 1
+  robust  // the paper's Algorithm 2 on a window without its foreground (RobustLearner)
+};
+
+struct LearnOptions {
+  Method method = Method::robust;
+  DmdOptions dmd;
+  int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
+  // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
+  int sample_step = 0;
+
+  static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
+};
+
+// The names, as users write them, of the options above that a method does not look at.
+std::span<const char* const> options_without_effect(Method method);
+
+}  // namespace qdmd

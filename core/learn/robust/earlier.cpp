@@ -1,0 +1,35 @@
+#include "core/learn/robust/earlier.h"
+
+#include <algorithm>
+
+namespace qdmd {
+
+LitPicture Earlier::picture(const Gain& gain) const {
+  return {{level_[0].data(), level_[1].data(), level_[2].data()}, gain};
+}
+
+Recollection Earlier::recollection(float most) const {
+  Recollection result = {weight_, limit_};
+  for (float& weight : result.weight) weight = std::min(weight, most);
+  return result;
+}
+
+void Earlier::take(const Grid& grid, const Reference& background,
+                   const std::vector<uint8_t>& spread, const StableFrames& stable, int count,
+                   float fresh) {
+  weight_.resize(grid.cells());
+  for (size_t cell = 0; cell < grid.cells(); ++cell) {
+    const std::span<const uint16_t> frames = stable.of_cell[cell];
+    const bool confirmed = !frames.empty() && frames.back() == count;
+    const auto shown = static_cast<float>(frames.size() - (confirmed ? 1 : 0));
+    weight_[cell] = (confirmed ? weight_[cell] : 0) + fresh * shown;
+  }
+  limit_ = stable.limit;
+  spread_ = spread;
+  for (size_t c = 0; c < kChannels; ++c) {
+    level_[c] = background.level[c];
+    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+  }
+}
+
+}  // namespace qdmd

@@ -1,0 +1,38 @@
+// What a window leaves to the next: its background, and how sure it was.
+#pragma once
+
+#include "core/learn/robust/median_picture.h"
+#include "core/passes/mask.h"
+
+namespace qdmd {
+
+// Whoever stands still through a whole window is background there. Where the window before had seen
+// what is behind, its picture takes part in the next start like one more frame of some weight.
+class Earlier {
+ public:
+  Earlier() = default;
+  explicit Earlier(const Grid& grid) : cells_(grid, 1) {}
+
+  bool known() const { return !weight_.empty(); }
+  void forget() { weight_.clear(); }
+
+  // The background's cells, in its window's unit light.
+  const GridFrames& cells() const { return cells_; }
+  LitPicture picture(const Gain& gain) const;
+  const std::vector<uint8_t>& spread() const { return spread_; }
+  // For a start of `most` frames at most.
+  Recollection recollection(float most) const;
+
+  // Replaces what is known by a window's background and the frames that showed it; where these
+  // include what was known (frame `count` of `stable`), it is confirmed. fresh: the share of the
+  // window's frames that no window before had. spread: as median_picture() has it, blurred.
+  void take(const Grid& grid, const Reference& background, const std::vector<uint8_t>& spread,
+            const StableFrames& stable, int count, float fresh);
+
+ private:
+  GridFrames cells_;
+  std::vector<uint8_t> level_[kChannels], spread_;
+  std::vector<float> weight_, limit_;  // by cells
+};
+
+}  // namespace qdmd

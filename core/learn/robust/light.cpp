@@ -1,0 +1,160 @@
+#include "core/learn/robust/light.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace qdmd {
+namespace {
+
+// Levels: cells that differ by less agree.
+constexpr float kAgree = 4;
+// Cells too dark or too bright have no ratio.
+constexpr float kDark = 8, kBright = 250;
+// A gain must make this many times as many cells agree, and this share of all cells besides.
+constexpr float kGrowth = 1.3f, kShare = 0.1f;
+// Frames are divided by gains.
+constexpr float kLeastGain = 0.01f;
+// Relative change of light that needs no following: less is a part of the noise.
+constexpr float kStill = 0.03f;
+
+float median(std::vector<float>* values) {
+  const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+float gray(const float* const planes[3], size_t cell) {
+  return (planes[0][cell] + planes[1][cell] + planes[2][cell]) / 3;
+}
+
+// Share of cells where frame / gain and reference agree.
+float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
+                const Gain& gain) {
+  size_t agree = 0;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    float difference = 0;
+    for (size_t c = 0; c < kChannels; ++c)
+      difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
+    if (difference < 3 * kAgree) ++agree;
+  }
+  return static_cast<float>(agree) / static_cast<float>(cells);
+}
+
+// The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
+Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells) {
+  constexpr int kBins = 300;
+  constexpr float kBin = 0.02f, kLowest = -3, kNear = 0.05f;
+  std::array<int, kBins + 4> histogram{};
+  std::vector<std::pair<float, size_t>> ratios;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    const float f = gray(frame, cell), r = gray(reference, cell);
+    if (f <= kDark || r <= kDark || f >= kBright || r >= kBright) continue;
+    const float ratio = std::log(f / r);
+    ratios.emplace_back(ratio, cell);
+    const int bin = static_cast<int>((ratio - kLowest) / kBin);
+    if (bin >= 0 && bin < kBins) ++histogram[static_cast<size_t>(bin) + 2];
+  }
+  if (ratios.size() < 16) return kSameLight;
+  int best = 0, most = -1;
+  for (int bin = 0; bin < kBins; ++bin) {
+    const int* at = histogram.data() + bin + 2;
+    const int smooth = at[-2] + 2 * at[-1] + 3 * at[0] + 2 * at[1] + at[2];
+    if (smooth > most) most = smooth, best = bin;
+  }
+  const float mode = kLowest + (static_cast<float>(best) + 0.5f) * kBin;
+  Gain gain = kSameLight;
+  std::vector<float> near;
+  for (size_t c = 0; c < kChannels; ++c) {
+    near.clear();
+    for (const auto& [ratio, cell] : ratios)
+      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark)
+        near.push_back(frame[c][cell] / reference[c][cell]);
+    // A channel that is dark everywhere: the light of the others.
+    gain[c] = near.empty() ? std::exp(mode) : std::max(median(&near), kLeastGain);
+  }
+  return gain;
+}
+
+Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, int reference) {
+  const float* const frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+  const float* const background[3] = {references.plane(reference, 0),
+                                      references.plane(reference, 1),
+                                      references.plane(reference, 2)};
+  const float before = agreement(frame, background, frames.cells(), kSameLight);
+  // What agrees needs no other light, and cannot gain enough.
+  if (kGrowth * before + kShare >= 1) return kSameLight;
+  const Gain gain = shared_gain(frame, background, frames.cells());
+  const float after = agreement(frame, background, frames.cells(), gain);
+  return after > kGrowth * before + kShare ? gain : kSameLight;
+}
+
+float brightness(const Gain& gain) { return (gain[0] + gain[1] + gain[2]) / 3; }
+
+// 1 for small changes, with a soft edge.
+Gain without_noise(const Gain& gain) {
+  const float share = std::clamp(std::abs(std::log(brightness(gain))) / kStill - 1, 0.0f, 1.0f);
+  if (share == 0) return kSameLight;
+  Gain settled = gain;
+  for (float& g : settled) g = std::exp(std::log(g) * share);
+  return settled;
+}
+
+}  // namespace
+
+GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
+  constexpr int kMost = 64;
+  const int used = std::min(count, kMost);
+  GridFrames result(frames.cells(), 1);
+  std::vector<float> levels(static_cast<size_t>(used));
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t cell = 0; cell < frames.cells(); ++cell) {
+      for (int i = 0; i < used; ++i) {
+        const int t = static_cast<int>(int64_t{i} * count / used);
+        levels[static_cast<size_t>(i)] =
+            frames.plane(t, c)[cell] / gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
+      }
+      result.plane(0, c)[cell] = median(&levels);
+    }
+  return result;
+}
+
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference) {
+  return without_noise(gain_over(frames, frame, background, reference));
+}
+
+std::vector<Gain> light_of(const GridFrames& frames, int count) {
+  std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
+  if (count < 2) return gains;
+  // The second reference is sharper where light changed.
+  for (int round = 0; round < 2; ++round) {
+    const GridFrames reference = median_frame(frames, count, gains);
+    for (int t = 0; t < count; ++t)
+      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0);
+    if (std::none_of(gains.begin(), gains.end(), is_lit)) return gains;
+  }
+  settle_light(&gains);
+  return gains;
+}
+
+void settle_light(std::vector<Gain>* gains) {
+  std::vector<float> logs;
+  for (const Gain& gain : *gains) logs.push_back(std::log(brightness(gain)));
+  std::vector<float> sorted = logs;
+  const float main = median(&sorted);
+  std::vector<size_t> near;
+  for (size_t t = 0; t < logs.size(); ++t)
+    if (std::abs(logs[t] - main) < kStill) near.push_back(t);
+  if (2 * near.size() < logs.size()) return;
+  Gain common = kSameLight;
+  for (size_t c = 0; c < kChannels; ++c) {
+    std::vector<float> levels;
+    for (size_t t : near) levels.push_back((*gains)[t][c]);
+    common[c] = median(&levels);
+  }
+  for (Gain& gain : *gains) {
+    for (size_t c = 0; c < kChannels; ++c) gain[c] /= common[c];
+    gain = without_noise(gain);
+  }
+}
+
+}  // namespace qdmd

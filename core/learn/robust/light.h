@@ -1,0 +1,26 @@
+// Global changes of light: how much brighter a frame is than another picture of the same scene.
+#pragma once
+
+#include <vector>
+
+#include "core/passes/grid.h"
+
+namespace qdmd {
+
+// The gains of frames 0 .. count - 1 over their common background: 1 where a change of light does
+// not explain what the frame and the background differ in, so that what moves counts as no light.
+// Small changes around the light of most frames are left out: they are noise.
+std::vector<Gain> light_of(const GridFrames& frames, int count);
+
+// Each cell's median over frames 0 .. count - 1 (64 of them at most) in unit light, as frame 0.
+GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains);
+
+// The gain of one frame over picture `reference` of `background`, both on the same grid; 1 where it
+// does not explain what they differ in, or is small.
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference);
+
+// Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
+// relative to that light. Does nothing where no light is that of half of the frames.
+void settle_light(std::vector<Gain>* gains);
+
+}  // namespace qdmd

@@ -1,0 +1,285 @@
+#include "core/learn/robust/robust_learner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/dmd/qdmd.h"
+#include "core/learn/robust/median_picture.h"
+#include "core/passes/sampling.h"
+
+namespace qdmd {
+namespace {
+
+// The step that leaves about 60 samples along the short side: more move no background
+// (docs/robust.md).
+int chosen_step(int width, int height) {
+  return std::max(1, static_cast<int>(std::lround(std::min(width, height) / 60.0)));
+}
+
+// Samples along the short side that the coarsest step leaves: half of those that are chosen.
+constexpr size_t kFewestSamples = 28;
+
+}  // namespace
+
+RobustLearner::RobustLearner(const LearnOptions& options, int width, int height,
+                             const RobustParameters& parameters)
+    : options_(options),
+      parameters_(parameters),
+      grid_(width, height, parameters.cells_along),
+      finest_step_(options.sample_step > 0 ? options.sample_step : chosen_step(width, height)),
+      step_(finest_step_) {
+  // What the paper fits to the first frame depends on what stood there.
+  options_.dmd.amplitude = Amplitude::window;
+  if (options_.dmd.rank == 0) options_.dmd.rank = 1;
+  reference_.width = width;
+  reference_.height = height;
+}
+
+std::vector<int> RobustLearner::sample_steps() const {
+  std::vector<int> steps = {finest_step_};
+  const int side = std::min(grid_.width, grid_.height);
+  while (sample_count(side, 2 * steps.back()) >= kFewestSamples) steps.push_back(2 * steps.back());
+  return steps;
+}
+
+size_t RobustLearner::samples_at(int step) const {
+  return sample_count(grid_.width, grid_.height, step);
+}
+
+uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
+                              int threads) const {
+  const auto workers = static_cast<uint64_t>(threads);
+  const uint64_t looks = static_cast<uint64_t>(std::min(window_size, parameters_.start_frames)) + 1;
+  const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
+  // The reference and what an earlier window left: levels, spread, threshold, reach.
+  const uint64_t pictures = pixels() * (2 * kChannels + 4);
+  const uint64_t kept = pictures + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
+                        StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
+                        PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
+                        SlidingGram::bytes(capacity, threads) +
+                        static_cast<uint64_t>(window_size) * sizeof(Gain);
+  const uint64_t models = (keep_pictures ? 2 : 1) *
+                          (BackgroundModel::bytes(pixels(), window_size,
+                                                  most_pictures(options_.dmd, window_size), true) +
+                           pixels());
+  // One after another: what a start compares, masks, the decomposition, the combination.
+  const uint64_t start = GridFrames::bytes(grid_, window_size) +
+                         GridFrames::bytes(grid_, static_cast<int>(looks)) + levels(2 * looks);
+  const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
+  const uint64_t filling = workers * Filler::bytes(window_size);
+  return kept + models +
+         std::max({start, pixels(), masks, decomposition_bytes(window_size), filling});
+}
+
+uint64_t RobustLearner::solver_bytes(int window_size) const {
+  if (options_.dmd.solver != Solver::adjoint) return 0;
+  return static_cast<uint64_t>(
+      adjoint_bytes(static_cast<double>(samples_at(finest_step_)), window_size));
+}
+
+void RobustLearner::begin(const LearnerRoom& room) {
+  room_ = room;
+  const int capacity = room.frames->capacity();
+  if (room.keep_pictures) options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
+  background_cells_ = GridFrames(grid_, 2);
+  earlier_ = Earlier(grid_);
+  mask_ = WindowMask(capacity, pixels());
+  samples_ = Window(capacity, samples_at(finest_step_));
+  gram_ = SlidingGram(capacity, room.pool);
+  for (auto& level : reference_.level) level.resize(pixels());
+  reference_.threshold.resize(pixels());
+  spread_.resize(pixels());
+  // Runs read to their end.
+  reach_.resize(room.frames->window().plane_size());
+}
+
+void RobustLearner::set_sample_step(int step) {
+  step_ = step;
+  samples_.resize(samples_at(step_));
+}
+
+// The background picture of the stable frames, its thresholds, and the light of each frame.
+void RobustLearner::start(const SnapshotRange& snapshots) {
+  const int m = snapshots.size();
+  const GridFrames& cells = room_.frames->cells();
+  GridFrames frames(grid_, m);
+  for (int t = 0; t < m; ++t)
+    for (int c = 0; c < kChannels; ++c)
+      std::copy_n(cells.plane(snapshots.slot(t), c), grid_.cells(), frames.plane(t, c));
+  gains_ = light_of(frames, m);
+
+  const int count = std::min(m, parameters_.start_frames);
+  std::vector<LitPicture> pictures(static_cast<size_t>(count));
+  GridFrames chosen(grid_, count + 1);
+  const auto choose = [&](const GridFrames& from, int frame, int i, const LitPicture& picture) {
+    pictures[static_cast<size_t>(i)] = picture;
+    for (int c = 0; c < kChannels; ++c) {
+      const float inverse = 1 / picture.gain[static_cast<size_t>(c)];
+      std::transform(from.plane(frame, c), from.plane(frame, c) + grid_.cells(), chosen.plane(i, c),
+                     [inverse](float level) { return level * inverse; });
+    }
+  };
+  for (int i = 0; i < count; ++i) {
+    const int t = static_cast<int>(int64_t{i} * m / count);
+    choose(frames, t, i,
+           {{snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
+            gains_[static_cast<size_t>(t)]});
+  }
+  Recollection recollection;
+  if (earlier_.known()) {
+    const GridFrames here = median_frame(frames, m, gains_);
+    pictures.emplace_back();
+    choose(earlier_.cells(), 0, count, earlier_.picture(light_over(earlier_.cells(), 0, here, 0)));
+    recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
+  }
+  stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
+                               room_.pool);
+  start_frames_ = count;
+
+  uint8_t* background[kChannels];
+  for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
+  std::vector<uint8_t> spread(pixels());
+  median_picture(grid_, stable_, pictures, room_.pool, background, spread.data());
+  recall_spread(&spread);
+  blur(spread.data(), reference_.width, reference_.height, spread_.data());
+  for (size_t p = 0; p < pixels(); ++p) {
+    // In steps of 1/4 level.
+    const int wide = spread_[p];
+    reference_.threshold[p] = static_cast<uint8_t>(
+        std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
+    reach_[p] = static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
+  }
+}
+
+// One picture has no spread: the one that an earlier window found.
+void RobustLearner::recall_spread(std::vector<uint8_t>* spread) const {
+  if (!earlier_.known()) return;
+  for (int row = 0; row < grid_.rows; ++row)
+    for (int col = 0; col < grid_.cols; ++col) {
+      const auto frames = stable_.of_cell[static_cast<size_t>(row * grid_.cols + col)];
+      if (frames.size() > 1 || frames.front() != start_frames_) continue;
+      for (int y = grid_.top(row); y < grid_.top(row + 1); ++y) {
+        const ptrdiff_t start = static_cast<ptrdiff_t>(y) * grid_.width;
+        std::copy(earlier_.spread().begin() + start + grid_.left(col),
+                  earlier_.spread().begin() + start + grid_.left(col + 1),
+                  spread->begin() + start + grid_.left(col));
+      }
+    }
+}
+
+void RobustLearner::find_foreground(const SnapshotRange& snapshots) {
+  // Before the threads begin, who must not run out of memory.
+  const size_t scratch_size = mask_scratch_bytes(reference_.width, reference_.height);
+  const auto scratch =
+      std::make_unique_for_overwrite<uint8_t[]>(scratch_size * room_.pool->threads());
+  room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
+    const int t = static_cast<int>(part);
+    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                 snapshots.plane(t, 2)};
+    find_mask(reference_, x, gains_[part], mask_.of(t), scratch.get() + worker * scratch_size);
+  });
+}
+
+Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
+  {
+    const Clock::Span span(*room_.clock, Clock::samples);
+    samples_.clear();
+    while (samples_.size() < snapshots.size()) samples_.append();
+    room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part) {
+      const int t = static_cast<int>(part), slot = samples_.slot(t);
+      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                   snapshots.plane(t, 2)};
+      uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
+                               samples_.plane(slot, 2)};
+      fill_samples(reference_, mask_.of(t), x, gains_[part], reach_.data(), step_, out);
+    });
+    gram_.add_newest(samples_, samples_.size());
+  }
+  return qdmd::decompose(samples_, gram_.matrix(samples_), options_.dmd);
+}
+
+// The modes' pictures from filled frames, run by run.
+void RobustLearner::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
+  std::vector<Filler> fillers;
+  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
+  const size_t run = fillers[0].run();
+  room_.pool->run((pixels() + run - 1) / run, [&](size_t part, size_t worker) {
+    const size_t first = part * run, count = std::min(run, pixels() - first);
+    model->build_from(
+        fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
+        first, count);
+  });
+}
+
+// The next background picture: L(t) in unit light.
+void RobustLearner::take_reference(BackgroundModel* model, double t) {
+  model->set_time(t);
+  for (size_t first = 0; first < pixels(); first += kMaxRun) {
+    const size_t count = std::min(kMaxRun, pixels() - first);
+    uint8_t* const out[3] = {reference_.level[0].data() + first, reference_.level[1].data() + first,
+                             reference_.level[2].data() + first};
+    model->evaluate(first, count, out);
+  }
+}
+
+// The light of the frames by sampled pixels.
+void RobustLearner::refine_light(const SnapshotRange& snapshots) {
+  if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
+  const Clock::Span span(*room_.clock, Clock::samples);
+  room_.pool->run(gains_.size(), [&](size_t part) {
+    const int t = static_cast<int>(part);
+    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                 snapshots.plane(t, 2)};
+    gains_[part] = refine_gain(reference_, x, gains_[part], step_);
+  });
+  settle_light(&gains_);
+}
+
+void RobustLearner::decompose(const SnapshotRange& snapshots) {
+  snapshots_ = snapshots;
+  const uint64_t seen = room_.frames->frames_taken();
+  fresh_ = std::min(1.0f,
+                    static_cast<float>(seen - frames_seen_) / static_cast<float>(snapshots.size()));
+  frames_seen_ = seen;
+}
+
+void RobustLearner::build(Slice, BackgroundModel* model) {
+  const SnapshotRange& snapshots = *snapshots_;
+  const Clock::Spent before = room_.clock->spent();
+  facts_ = {};
+  {
+    const Clock::Span span(*room_.clock, Clock::solving);
+    start(snapshots);
+    for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+      refine_light(snapshots);
+      find_foreground(snapshots);
+      const Decomposition decomposition = decompose_filled(snapshots);
+      facts_.dmd = decomposition.summary;
+      model->begin(snapshots, decomposition.background, true);
+      combine(snapshots, model);
+      take_reference(model, snapshots.size() / 2);
+    }
+    end(model);
+  }
+  facts_.window_frames = snapshots.size();
+  facts_.sample_step = step_;
+  facts_.iterations = options_.iterations;
+  facts_.solve_time = room_.clock->spent().since(before).of_solves();
+}
+
+// What others ask the model, and what later windows are told.
+void RobustLearner::end(BackgroundModel* model) {
+  for (int c = 0; c < kChannels; ++c)
+    cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
+               background_cells_.plane(1 - published_, c));
+  if (parameters_.earlier_share > 0)
+    earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh_);
+  model->set_gains(gains_);
+  // A pixel alone is judged more strictly than with those around it.
+  uint8_t* limits = model->make_limits();
+  std::transform(
+      reference_.threshold.begin(), reference_.threshold.end(), limits,
+      [](int threshold) { return static_cast<uint8_t>(std::min(255, 3 * threshold / 2)); });
+}
+
+}  // namespace qdmd

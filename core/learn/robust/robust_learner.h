@@ -1,0 +1,103 @@
+// Robust Q-DMD: the background modes of a window whose foreground was taken out.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/dmd/decompose.h"
+#include "core/gram/gram.h"
+#include "core/learn/learner.h"
+#include "core/learn/robust/earlier.h"
+#include "core/learn/robust/light.h"
+#include "core/learn/robust/stable_frames.h"
+#include "core/passes/fill.h"
+
+namespace qdmd {
+
+// What docs/robust.md measures other values of; users have no say in it.
+struct RobustParameters {
+  int cells_along = kCellsAlong;  // of the grid, along the short side
+  // Frames that the start compares, at most: more cost time and say little new.
+  int start_frames = 160;
+  // A pixel is foreground above least_threshold, and above so many spreads of the frames that show
+  // its background.
+  int least_threshold = 12;
+  int spreads = 4;
+  // Samples within half a spread of the background, at least so many levels, count in full.
+  int least_reach = 2;
+  // What an earlier window's background counts at most, in start frames of this one; 0: windows
+  // know nothing of each other.
+  float earlier_share = 0.5f;
+};
+
+// The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
+//   start    for each region the frames that show its background (find_stable_frames), and their
+//            median: a background picture and its spread
+//   repeat   what differs from the picture is foreground (find_mask) and becomes background
+//            (Filler); Q-DMD of the filled window, of rank 1 unless another is asked for, with
+//            amplitudes fitted to all frames, is the next background
+// Global changes of light are divided out before and put back in L(t). Inner products are taken
+// from sampled pixels, exactly; the pictures of the modes are combined from all.
+class RobustLearner : public Learner {
+ public:
+  RobustLearner(const LearnOptions& options, int width, int height,
+                const RobustParameters& parameters = {});
+
+  FrameContents contents() const override { return {1, parameters_.cells_along}; }
+  std::vector<int> sample_steps() const override;
+  bool in_one_piece() const override { return true; }
+  uint64_t bytes(int window_size, int capacity, bool keep_pictures, int threads) const override;
+  uint64_t solver_bytes(int window_size) const override;
+
+  void begin(const LearnerRoom& room) override;
+  void forget() override { earlier_.forget(); }
+  void set_sample_step(int step) override;
+  void add(const SnapshotRange&, int, Slice) override {}
+  void decompose(const SnapshotRange& snapshots) override;
+  void build(Slice slice, BackgroundModel* model) override;
+  SolveFacts facts() const override { return facts_; }
+  void publish() override { published_ = 1 - published_; }
+
+  bool follows_light() const override { return true; }
+  Gain light(int slot) const override {
+    return light_over(room_.frames->cells(), slot, background_cells_, published_);
+  }
+
+ private:
+  size_t pixels() const { return reference_.pixels(); }
+  size_t samples_at(int step) const;
+  void start(const SnapshotRange& snapshots);
+  void refine_light(const SnapshotRange& snapshots);
+  void recall_spread(std::vector<uint8_t>* spread) const;
+  void find_foreground(const SnapshotRange& snapshots);
+  Decomposition decompose_filled(const SnapshotRange& snapshots);
+  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
+  void take_reference(BackgroundModel* model, double t);
+  void end(BackgroundModel* model);
+
+  LearnOptions options_;
+  RobustParameters parameters_;
+  Grid grid_;
+  int finest_step_, step_;
+  LearnerRoom room_ = {};
+  GridFrames background_cells_;  // of the published and the newest solve, in unit light
+  int published_ = 0;
+  Earlier earlier_;
+  // Of the newest solve: its snapshots, the share of them that no solve before had, frames that the
+  // start compared, and what it found.
+  std::optional<SnapshotRange> snapshots_;
+  float fresh_ = 1;
+  uint64_t frames_seen_ = 0;  // that the store had taken by then
+  int start_frames_ = 0;
+  StableFrames stable_;
+  Reference reference_;
+  std::vector<uint8_t> spread_;  // quarters of a level, mean of 5 x 5
+  std::vector<uint8_t> reach_;
+  std::vector<Gain> gains_;  // of the snapshots
+  WindowMask mask_;          // of the snapshots
+  Window samples_;           // filled
+  SlidingGram gram_;
+  SolveFacts facts_;
+};
+
+}  // namespace qdmd

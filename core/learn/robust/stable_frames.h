@@ -1,0 +1,62 @@
+// Which frames show a region's background: the start of robust Q-DMD.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/parallel/pool.h"
+#include "core/passes/grid.h"
+
+namespace qdmd {
+
+// A list of frames for each cell, in memory that depends on no picture.
+class FrameLists {
+ public:
+  FrameLists() = default;
+  // Empty lists, for up to `most` frames each.
+  FrameLists(size_t cells, int most)
+      : most_(static_cast<size_t>(most)), counts_(cells, 0), frames_(cells * most_) {}
+  static uint64_t bytes(uint64_t cells, uint64_t most) {
+    return cells * (most + 1) * sizeof(uint16_t);
+  }
+
+  size_t size() const { return counts_.size(); }
+  std::span<const uint16_t> operator[](size_t cell) const {
+    return {frames_.data() + cell * most_, counts_[cell]};
+  }
+  void add(size_t cell, int frame) {
+    frames_[cell * most_ + counts_[cell]++] = static_cast<uint16_t>(frame);
+  }
+
+ private:
+  size_t most_ = 0;
+  std::vector<uint16_t> counts_, frames_;
+};
+
+// For each cell the frames that show its background, in time order, and the patches' distance from
+// it up to which they do.
+struct StableFrames {
+  FrameLists of_cell;
+  std::vector<float> limit;
+
+  // Where `looks` frames are compared.
+  static uint64_t bytes(const Grid& grid, uint64_t looks) {
+    return FrameLists::bytes(grid.cells(), looks) + grid.cells() * sizeof(float);
+  }
+};
+
+// What a cell's look in an earlier window says: as much as `weight` frames that show it, where
+// patches are alike up to `limit`.
+struct Recollection {
+  std::vector<float> weight, limit;
+};
+
+// frames: `count` pictures in one light, and a further one of the background in earlier windows
+// where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
+// around it that most frames share (the mode of the patches' density), corrected where another
+// frame's region fits its surroundings better: what stands still for long shows by its contour.
+StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
+                                const Recollection* earlier, Pool* pool);
+
+}  // namespace qdmd

@@ -1,0 +1,156 @@
+#include "core/model/background_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace qdmd {
+namespace {
+
+// rows x J to the order that combine_planes reads.
+template <typename Matrix>
+void group_by_four(const Matrix& rows, std::vector<double>* out) {
+  const Eigen::Index groups = (rows.rows() + 3) / 4;
+  out->assign(static_cast<size_t>(groups * 4 * rows.cols()), 0.0);
+  for (Eigen::Index k = 0; k < rows.rows(); ++k)
+    for (Eigen::Index j = 0; j < rows.cols(); ++j)
+      (*out)[static_cast<size_t>(4 * ((k / 4) * rows.cols() + j) + k % 4)] = rows(k, j);
+}
+
+constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+}  // namespace
+
+uint64_t BackgroundModel::bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures) {
+  // More pictures than this are not made; what is frozen has three.
+  const int direct_above = kChannels * snapshots / static_cast<int>(sizeof(float));
+  const int made = keep_pictures || pictures <= direct_above ? std::max(pictures, kChannels)
+                                                             : std::max(direct_above, kChannels);
+  const auto planes = static_cast<uint64_t>(kChannels) * static_cast<uint64_t>(snapshots);
+  // The pictures, their basis twice (as it is, and as combine_planes() reads it), and the planes.
+  return sizeof(float) * static_cast<uint64_t>(made) * pixels +
+         planes * (2 * sizeof(double) * static_cast<uint64_t>(made + 3) + sizeof(uint8_t*));
+}
+
+void BackgroundModel::make_pictures(size_t count) {
+  samples_.resize(count * pixels_);
+  pictures_.resize(count);
+  for (size_t k = 0; k < count; ++k) pictures_[k] = samples_.data() + k * pixels_;
+}
+
+void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel& model,
+                            bool keep_pictures) {
+  model_ = model;
+  basis_ = model.basis();
+  pixels_ = snapshots.pixels();
+  frozen_ = false;
+  gains_.clear();
+  limits_.clear();
+  planes_.clear();
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
+  const auto pictures = static_cast<size_t>(basis_.rows());
+  direct_ = !keep_pictures &&
+            pictures * sizeof(float) > static_cast<size_t>(kChannels * snapshots.size());
+  make_pictures(direct_ ? 0 : pictures);
+  if (!direct_) group_by_four(basis_, &coefficients_);
+}
+
+void BackgroundModel::build_slice(size_t first, size_t count) {
+  if (!direct_) combine_runs(planes_.data(), first, first, count);
+}
+
+void BackgroundModel::build_from(const uint8_t* const* planes, size_t first, size_t count) {
+  combine_runs(planes, 0, first, count);
+}
+
+// planes[j][from] is the first sample of pixel `first`.
+void BackgroundModel::combine_runs(const uint8_t* const* planes, size_t from, size_t first,
+                                   size_t count) {
+  // Short runs, whose samples of all planes stay in the second-level cache for every group of
+  // pictures.
+  constexpr size_t kRun = 256;
+  std::array<float*, 4> sums;
+  for (size_t done = 0; done < count; done += kRun)
+    for (size_t k = 0; k < picture_count(); k += 4) {
+      const size_t group = std::min<size_t>(4, picture_count() - k);
+      for (size_t i = 0; i < group; ++i) sums[i] = pictures_[k + i] + first + done;
+      combine_planes(coefficients_.data() + k * planes_.size(), group, planes, planes_.size(),
+                     from + done, std::min(kRun, count - done), sums.data());
+    }
+}
+
+void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel& model) {
+  begin(snapshots, model);
+  build_slice(0, pixels_);
+}
+
+void BackgroundModel::set_time(double t) {
+  if (frozen_) {
+    weights_.assign(kIdentity.begin(), kIdentity.end());
+    if (!gains_.empty())
+      for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gains_.front()[c];
+    return;
+  }
+  model_.weights(t, &time_weights_);
+  if (!gains_.empty()) {
+    const auto last = static_cast<double>(gains_.size() - 1);
+    const Gain& gain = gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
+    for (size_t c = 0; c < gain.size(); ++c)
+      time_weights_.row(static_cast<Eigen::Index>(c)) *= gain[c];
+  }
+  if (direct_) {
+    direct_weights_.noalias() = time_weights_ * basis_;
+    group_by_four(direct_weights_, &coefficients_);
+    return;
+  }
+  const size_t pictures = picture_count();
+  weights_.resize(3 * pictures);
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t k = 0; k < pictures; ++k)
+      weights_[c * pictures + k] = static_cast<float>(
+          time_weights_(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(k)));
+}
+
+void BackgroundModel::combine_directly(size_t first, size_t count, float* const* out) const {
+  combine_planes(coefficients_.data(), 3, planes_.data(), planes_.size(), first, count, out);
+}
+
+void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
+  if (!direct_) {
+    levels_of(weights_.data(), pictures_.data(), picture_count(), first, count, out);
+    return;
+  }
+  std::array<std::array<float, kMaxRun + kSliceUnit>, 3> sums;
+  float* const rows[3] = {sums[0].data(), sums[1].data(), sums[2].data()};
+  const size_t offset = first % kSliceUnit;
+  combine_directly(first - offset, count + offset, rows);
+  levels_of(kIdentity.data(), rows, 3, offset, count, out);
+}
+
+void BackgroundModel::freeze_at(double t) {
+  if (frozen_) return;
+  set_time(t);
+  if (direct_) {
+    make_pictures(3);
+    combine_directly(0, pixels_, pictures_.data());
+  } else {
+    // The pictures make room for L(t), pixel by pixel.
+    const size_t pictures = picture_count();
+    samples_.resize(std::max<size_t>(pictures, 3) * pixels_);
+    for (size_t p = 0; p < pixels_; ++p) {
+      std::array<float, 3> level{};
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t k = 0; k < pictures; ++k)
+          level[c] += weights_[c * pictures + k] * samples_[k * pixels_ + p];
+      for (size_t c = 0; c < 3; ++c) samples_[c * pixels_ + p] = level[c];
+    }
+    make_pictures(3);
+  }
+  direct_ = false;
+  frozen_ = true;
+  gains_.clear();
+  weights_.assign(kIdentity.begin(), kIdentity.end());
+}
+
+}  // namespace qdmd

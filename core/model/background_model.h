@@ -1,0 +1,89 @@
+// The pictures of a solved window: evaluates L(t) at pixels.
+#pragma once
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/base/channels.h"
+#include "core/dmd/temporal_model.h"
+#include "core/gram/window.h"
+#include "core/passes/combine.h"
+
+namespace qdmd {
+
+// L(t) of one solved window. A few modes are kept as pictures, which makes a frame cost 3 K
+// products per pixel; many modes, whose pictures would take more memory than the window itself,
+// combine the window's frames directly at 9 m products per pixel.
+class BackgroundModel {
+ public:
+  // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
+  // direct, until the next build.
+  void build(const SnapshotRange& snapshots, const TemporalModel& model);
+  // The same in pieces: begin(), then build_slice() for slices that cover each pixel once, by any
+  // thread, in any order. Slices start at multiples of kSliceUnit pixels.
+  // keep_pictures: never combine directly.
+  void begin(const SnapshotRange& snapshots, const TemporalModel& model,
+             bool keep_pictures = false);
+  void build_slice(size_t first, size_t count);
+  static constexpr size_t kSliceUnit = 64;
+  // A slice from other samples than the snapshots': planes[j] begins with pixel `first` and can be
+  // read up to the next multiple of 64 samples. Not where the combination is direct.
+  void build_from(const uint8_t* const* planes, size_t first, size_t count);
+  // Of the snapshots: L(t) is multiplied by them, at other times by the nearest one. Kept until
+  // begin().
+  void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
+  // For set_time() from now on, in place of the snapshots' gains.
+  void set_light(const Gain& gain) { gains_.assign(1, gain); }
+
+  // Of each pixel, in levels: what its residual must exceed to be foreground where nobody asks for
+  // a threshold. Room for them, kept until begin().
+  uint8_t* make_limits() {
+    limits_.resize(pixels_);
+    return limits_.data();
+  }
+  // Null: there are none.
+  const uint8_t* limits() const { return limits_.empty() ? nullptr : limits_.data(); }
+
+  // What a model of a window of `snapshots` takes with up to so many pictures of modes, without
+  // limits.
+  static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures);
+
+  // The most modes whose pictures take no more memory than a window of `snapshots`.
+  static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
+
+  // True while the snapshots are still read.
+  bool reads_snapshots() const { return direct_ && !frozen_; }
+  // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are
+  // no longer needed.
+  void freeze_at(double t);
+
+  // Sets the time of the following calls, in frames from the solved window's first snapshot.
+  void set_time(double t);
+  // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one
+  // array a channel. count <= kMaxRun.
+  void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
+
+ private:
+  size_t picture_count() const { return pictures_.size(); }
+  // The same before rounding, at a `first` that is a multiple of kSliceUnit, where the combination
+  // is direct.
+  void combine_directly(size_t first, size_t count, float* const* out) const;
+  void combine_runs(const uint8_t* const* planes, size_t from, size_t first, size_t count);
+  void make_pictures(size_t count);
+
+  TemporalModel model_;
+  Eigen::MatrixXd basis_, time_weights_, direct_weights_;
+  bool direct_ = false, frozen_ = false;
+  size_t pixels_ = 0;
+  std::vector<const uint8_t*> planes_;  // of the snapshots, in time order
+  std::vector<double>
+      coefficients_;            // of the pictures, or of L(t) where direct_, for combine_planes
+  std::vector<float> samples_;  // of the pictures, one after another
+  std::vector<float*> pictures_;
+  std::vector<float> weights_;  // 3 x K over pictures
+  std::vector<Gain> gains_;     // of the snapshots; none: the same light
+  std::vector<uint8_t> limits_;
+};
+
+}  // namespace qdmd

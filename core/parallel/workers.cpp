@@ -1,0 +1,25 @@
+#include "core/parallel/workers.h"
+
+#include <algorithm>
+#include <thread>
+
+namespace qdmd {
+
+int Workers::count(int threads) {
+  if (threads > 0) return std::min(threads, kMost);
+  // Zero where the system does not tell.
+  return static_cast<int>(
+      std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, unsigned{kMost}));
+}
+
+Workers::Workers(int threads)
+    : threads_(threads), asked_(threads), pool_(count(threads)), side_(count(threads) > 1) {}
+
+void Workers::follow() {
+  if (asked_ == threads_ || !side_.idle()) return;
+  threads_ = asked_;
+  pool_.resize(count(threads_));
+  side_.set_active(count(threads_) > 1);
+}
+
+}  // namespace qdmd

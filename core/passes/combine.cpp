@@ -1,0 +1,150 @@
+#include "core/passes/combine.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/combine.cpp"
+#include "core/passes/simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Four sums at two vectors of pixels. Variables, because compilers keep arrays of vectors in
+// memory.
+template <class D>
+struct Sums {
+  using V = hn::Vec<D>;
+  V a0, a1, b0, b1, c0, c1, e0, e1;
+
+  HWY_INLINE void clear() { a0 = a1 = b0 = b1 = c0 = c1 = e0 = e1 = hn::Zero(D()); }
+  HWY_INLINE void add(const double* coefficients, const uint8_t* samples) {
+    const D d;
+    const V x0 = load(samples), x1 = load(samples + hn::Lanes(d));
+    const V a = hn::Set(d, coefficients[0]), b = hn::Set(d, coefficients[1]);
+    const V c = hn::Set(d, coefficients[2]), e = hn::Set(d, coefficients[3]);
+    a0 = hn::MulAdd(a, x0, a0), a1 = hn::MulAdd(a, x1, a1);
+    b0 = hn::MulAdd(b, x0, b0), b1 = hn::MulAdd(b, x1, b1);
+    c0 = hn::MulAdd(c, x0, c0), c1 = hn::MulAdd(c, x1, c1);
+    e0 = hn::MulAdd(e, x0, e0), e1 = hn::MulAdd(e, x1, e1);
+  }
+  HWY_INLINE void store(float* const* out, size_t used, size_t p) const {
+    store_one(a0, a1, out[0] + p);
+    if (used > 1) store_one(b0, b1, out[1] + p);
+    if (used > 2) store_one(c0, c1, out[2] + p);
+    if (used > 3) store_one(e0, e1, out[3] + p);
+  }
+
+ private:
+  static HWY_INLINE V load(const uint8_t* from) {
+    const hn::Rebind<int32_t, D> d32;
+    const hn::Rebind<uint8_t, D> d8;
+    return hn::PromoteTo(D(), hn::PromoteTo(d32, hn::LoadU(d8, from)));
+  }
+  static HWY_INLINE void store_one(V x0, V x1, float* to) {
+    const hn::Rebind<float, D> d32;
+    hn::StoreU(hn::DemoteTo(d32, x0), d32, to);
+    hn::StoreU(hn::DemoteTo(d32, x1), d32, to + hn::Lanes(d32));
+  }
+};
+
+template <class D>
+size_t level_vectors(const float* weights, const float* const* pictures, size_t picture_count,
+                     size_t p, size_t first, size_t count, uint8_t* const* out) {
+  const D d;
+  const hn::Rebind<int32_t, D> d32;
+  const hn::Rebind<uint8_t, D> d8;
+  const float* red = weights;
+  const float* green = weights + picture_count;
+  const float* blue = weights + 2 * picture_count;
+  // Adding a half and truncating rounds to nearest in the range that survives the clamp.
+  const auto half = hn::Set(d, 0.5f), zero = hn::Zero(d), top = hn::Set(d, 255.0f);
+  const auto store = [&](hn::Vec<D> sum, uint8_t* to) HWY_ATTR {
+    // The comparison sends a NaN (infinity less infinity) to zero.
+    const auto positive = hn::IfThenElseZero(hn::Gt(sum, zero), sum);
+    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(d32, hn::Min(positive, top))), d8, to);
+  };
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    auto r = half, g = half, b = half;
+    for (size_t k = 0; k < picture_count; ++k) {
+      const auto level = hn::LoadU(d, pictures[k] + first + p);
+      r = hn::MulAdd(hn::Set(d, red[k]), level, r);
+      g = hn::MulAdd(hn::Set(d, green[k]), level, g);
+      b = hn::MulAdd(hn::Set(d, blue[k]), level, b);
+    }
+    store(r, out[0] + p);
+    store(g, out[1] + p);
+    store(b, out[2] + p);
+  }
+  return p;
+}
+
+}  // namespace
+
+// coefficients: four of each plane. used: how many of the four sums somebody takes.
+void combine_four(const double* coefficients, const uint8_t* const* planes, size_t plane_count,
+                  size_t first, size_t count, size_t used, float* const* sums) {
+  using D = hn::ScalableTag<double>;
+  const size_t lanes = hn::Lanes(D()), block = 4 * lanes;
+  for (size_t p = 0; p < count; p += block) {
+    Sums<D> low, high;
+    low.clear(), high.clear();
+    for (size_t j = 0; j < plane_count; ++j) {
+      const uint8_t* from = planes[j] + first + p;
+      // The planes are too many streams for the hardware to foresee.
+      hwy::Prefetch(from + 256);
+      low.add(coefficients + 4 * j, from);
+      high.add(coefficients + 4 * j, from + 2 * lanes);
+    }
+    if (p + block <= count) {
+      low.store(sums, used, p);
+      high.store(sums, used, p + 2 * lanes);
+      continue;
+    }
+    alignas(64) float last[4][4 * HWY_MAX_BYTES / sizeof(double)];
+    float* const rows[4] = {last[0], last[1], last[2], last[3]};
+    low.store(rows, used, 0);
+    high.store(rows, used, 2 * lanes);
+    for (size_t k = 0; k < used; ++k) std::copy_n(last[k], count - p, sums[k] + p);
+  }
+}
+
+// Pixels that fill no vector take the same steps one by one, so that a pixel's bits do not depend
+// on where a run begins.
+void levels(const float* weights, const float* const* pictures, size_t picture_count, size_t first,
+            size_t count, uint8_t* const* out) {
+  const size_t p =
+      level_vectors<hn::ScalableTag<float>>(weights, pictures, picture_count, 0, first, count, out);
+  level_vectors<hn::CappedTag<float, 1>>(weights, pictures, picture_count, p, first, count, out);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+namespace {
+
+HWY_EXPORT(combine_four);
+HWY_EXPORT(levels);
+
+}  // namespace
+
+void combine_planes(const double* coefficients, size_t sum_count, const uint8_t* const* planes,
+                    size_t plane_count, size_t first, size_t count, float* const* sums) {
+  for (size_t k = 0; k < sum_count; k += 4) HWY_DYNAMIC_DISPATCH(combine_four)
+  (coefficients + k * plane_count, planes, plane_count, first, count,
+   std::min<size_t>(4, sum_count - k), sums + k);
+}
+
+void levels_of(const float* weights, const float* const* pictures, size_t picture_count,
+               size_t first, size_t count, uint8_t* const out[3]) {
+  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, first, count, out);
+}
+
+}  // namespace qdmd
+#endif

@@ -1,0 +1,63 @@
+// Takes the foreground out of a window: what is no background becomes background.
+#pragma once
+
+#include <vector>
+
+#include "core/gram/window.h"
+#include "core/passes/mask.h"
+
+namespace qdmd {
+
+// The masks of a window's snapshots, one after another.
+class WindowMask {
+ public:
+  WindowMask() = default;
+  WindowMask(int capacity, size_t pixels);
+  static uint64_t bytes(int capacity, size_t pixels);
+  uint64_t bytes() const { return bits_.capacity(); }
+
+  uint8_t* of(int snapshot) { return bits_.data() + static_cast<size_t>(snapshot) * stride_; }
+  const uint8_t* of(int snapshot) const {
+    return bits_.data() + static_cast<size_t>(snapshot) * stride_;
+  }
+
+ private:
+  size_t stride_ = 0;
+  std::vector<uint8_t> bits_;
+};
+
+// Fills runs of pixels of all snapshots. One for each thread.
+class Filler {
+ public:
+  // Runs of up to run() pixels, a multiple of 64: they stay in the second-level cache.
+  explicit Filler(int snapshots);
+  static uint64_t bytes(int snapshots);
+  Filler(Filler&&) = default;  // not copied: planes_ points into samples_
+  size_t run() const { return run_; }
+
+  // Pixels first .. first + count - 1 in unit light; `first` is a multiple of 64. Where a snapshot
+  // is masked, it becomes the median of the pixel's other snapshots, or the reference's level where
+  // there are none. Others are
+  // drawn to that median until they are no farther from it than `reach`: one step of Huber's
+  // estimate of the mean (Robust Statistics, 1981). reach: width * height samples, or null: any
+  // distance.
+  // Returns a plane of samples for each channel of each snapshot, readable up to the next multiple
+  // of 64; they are good until the next call.
+  const uint8_t* const* fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                             const WindowMask& mask, const Reference& reference,
+                             const uint8_t* reach, size_t first, size_t count);
+
+ private:
+  size_t run_;
+  std::vector<uint8_t> samples_, keep_;
+  std::vector<const uint8_t*> planes_;
+  std::vector<uint16_t> masked_;  // snapshots, of each pixel
+};
+
+// Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,
+// drawn to that as Filler does to the median: for inner products. out: ceil(width / step) *
+// ceil(height / step) samples a channel.
+void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]);
+
+}  // namespace qdmd

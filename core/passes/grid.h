@@ -1,0 +1,58 @@
+// Pictures on a coarse grid: means over cells, on which regions are compared.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/channels.h"
+
+namespace qdmd {
+
+// Square cells of about 1/kCellsAlong of the picture's short side, in very thin pictures of
+// 1/kMostCellsAlong of the long one; they cover it without overlap.
+constexpr int kCellsAlong = 48, kMostCellsAlong = 640;
+struct Grid {
+  int width = 0, height = 0;  // pixels
+  int rows = 0, cols = 0;     // cells
+
+  Grid() = default;
+  Grid(int width, int height, int cells_along = kCellsAlong);
+
+  size_t cells() const { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
+  // The first pixel row of a row of cells, the first pixel column of a column.
+  int top(int row) const { return static_cast<int>(int64_t{row} * height / rows); }
+  int left(int col) const { return static_cast<int>(int64_t{col} * width / cols); }
+};
+
+// Pictures of cells: for each one R, then G, then B of all cells in row order, in levels.
+class GridFrames {
+ public:
+  GridFrames() = default;
+  GridFrames(size_t cells, int count)
+      : cells_(cells), levels_(cells * kChannels * static_cast<size_t>(count)) {}
+  GridFrames(const Grid& grid, int count) : GridFrames(grid.cells(), count) {}
+
+  static uint64_t bytes(const Grid& grid, int count) {
+    return uint64_t{grid.cells()} * kChannels * sizeof(float) * static_cast<uint64_t>(count);
+  }
+  uint64_t bytes() const { return levels_.capacity() * sizeof(float); }
+
+  size_t cells() const { return cells_; }
+  float* plane(int frame, int channel) { return levels_.data() + offset(frame, channel); }
+  const float* plane(int frame, int channel) const {
+    return levels_.data() + offset(frame, channel);
+  }
+
+ private:
+  size_t offset(int frame, int channel) const {
+    return (static_cast<size_t>(frame) * kChannels + static_cast<size_t>(channel)) * cells_;
+  }
+  size_t cells_ = 0;
+  std::vector<float> levels_;
+};
+
+// The mean of each cell of a plane of grid.width * grid.height samples.
+void cell_means(const Grid& grid, const uint8_t* plane, float* means);
+
+}  // namespace qdmd

@@ -1,0 +1,245 @@
+#include "core/passes/mask.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "core/passes/residual.h"
+#include "core/passes/unit_light.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/mask.cpp"
+#include "core/passes/simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Plain loops over one row, which the compiler makes vectors of for each instruction set.
+
+void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
+               uint8_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor);
+}
+
+// padded: two samples before the row's first and two after its last.
+void sum_five_columns(const uint8_t* HWY_RESTRICT padded, size_t count,
+                      uint16_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; ++i)
+    out[i] = static_cast<uint16_t>(padded[i] + padded[i + 1] + padded[i + 2] + padded[i + 3] +
+                                   padded[i + 4]);
+}
+
+void sum_five_rows(const uint16_t* const* rows, size_t count, uint16_t* HWY_RESTRICT out) {
+  const uint16_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4];
+  for (size_t i = 0; i < count; ++i)
+    out[i] = static_cast<uint16_t>(a[i] + b[i] + c[i] + d[i] + e[i]);
+}
+
+// 1 where the five rows' sums exceed 25 thresholds.
+void exceed_row(const uint16_t* const* rows, const uint8_t* HWY_RESTRICT threshold, size_t count,
+                uint8_t* HWY_RESTRICT out) {
+  const uint16_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4];
+  for (size_t i = 0; i < count; ++i)
+    out[i] = static_cast<uint16_t>(a[i] + b[i] + c[i] + d[i] + e[i]) >
+             static_cast<uint16_t>(25 * threshold[i]);
+}
+
+// padded: three samples before the row's first and three after its last.
+void sum_seven_columns(const uint8_t* HWY_RESTRICT padded, size_t count,
+                       uint8_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; ++i)
+    out[i] = static_cast<uint8_t>(padded[i] + padded[i + 1] + padded[i + 2] + padded[i + 3] +
+                                  padded[i + 4] + padded[i + 5] + padded[i + 6]);
+}
+
+// 1 where most of 7 x 7 are.
+void most_row(const uint8_t* const* rows, size_t count, uint8_t* HWY_RESTRICT out) {
+  const uint8_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4], *f = rows[5],
+                *g = rows[6];
+  for (size_t i = 0; i < count; ++i)
+    out[i] = static_cast<uint8_t>(a[i] + b[i] + c[i] + d[i] + e[i] + f[i] + g[i]) > 24;
+}
+
+// One bit for each of `count` samples, set where they are not 0. Samples are readable, and bits
+// are written, up to the next multiple of 64.
+void pack_bits(const uint8_t* samples, size_t count, uint8_t* bits) {
+  const hn::CappedTag<uint8_t, 64> d;
+  const size_t lanes = hn::Lanes(d);
+  const auto zero = hn::Zero(d);
+  if (lanes < 8) {
+    std::memset(bits, 0, mask_bytes(count));
+    for (size_t i = 0; i < count; ++i)
+      bits[i / 8] = static_cast<uint8_t>(bits[i / 8] | (samples[i] != 0) << i % 8);
+    return;
+  }
+  for (size_t i = 0; i < count; i += lanes)
+    hn::StoreMaskBits(d, hn::Gt(hn::LoadU(d, samples + i), zero), bits + i / 8);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+namespace {
+
+HWY_EXPORT(scale_row);
+HWY_EXPORT(sum_five_columns);
+HWY_EXPORT(sum_five_rows);
+HWY_EXPORT(exceed_row);
+HWY_EXPORT(sum_seven_columns);
+HWY_EXPORT(most_row);
+HWY_EXPORT(pack_bits);
+
+// Samples that pack_bits() may read behind the last.
+constexpr size_t kBitsRead = 64;
+
+constexpr int kMeanReach = 2, kMajorityReach = 3;  // pixels around one that judge it with it
+
+// `row` with `reach` more samples at both ends, which repeat its first and last.
+void pad_row(const uint8_t* row, size_t width, size_t reach, uint8_t* padded) {
+  std::memset(padded, row[0], reach);
+  std::memcpy(padded + reach, row, width);
+  std::memset(padded + reach + width, row[width - 1], reach);
+}
+
+// The last 2 kReach + 1 rows of a picture.
+template <typename T, int kReach>
+class RowRing {
+ public:
+  static constexpr int kRows = 2 * kReach + 1;
+  RowRing(T* memory, size_t width) : memory_(memory), width_(width) {}
+  T* of(int row) { return memory_ + static_cast<size_t>(row % kRows) * width_; }
+  // The rows around `row`; the picture's first and last stand for those outside.
+  std::array<const T*, kRows> around(int row, int height) {
+    std::array<const T*, kRows> rows;
+    for (int i = 0; i < kRows; ++i)
+      rows[static_cast<size_t>(i)] = of(std::clamp(row + i - kReach, 0, height - 1));
+    return rows;
+  }
+
+ private:
+  T* memory_;
+  size_t width_;
+};
+using SumRing = RowRing<uint16_t, kMeanReach>;
+using CountRing = RowRing<uint8_t, kMajorityReach>;
+
+}  // namespace
+
+size_t mask_scratch_bytes(int width, int height) {
+  const auto w = static_cast<size_t>(width);
+  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 5 * w +
+                       (w + 2 * kMajorityReach) + w * static_cast<size_t>(height) + kBitsRead;
+  // The next thread's begins at an even address, too.
+  return bytes + bytes % 2;
+}
+
+void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+               uint8_t* bits, uint8_t* scratch) noexcept {
+  const int height = reference.height;
+  const auto width = static_cast<size_t>(reference.width);
+  const size_t pixels = reference.pixels();
+  const bool lit = is_lit(gain);
+  const auto take = [&scratch](size_t bytes) { return std::exchange(scratch, scratch + bytes); };
+  SumRing sums(reinterpret_cast<uint16_t*>(take(2 * width * SumRing::kRows)), width);
+  CountRing counts(take(width * CountRing::kRows), width);
+  uint8_t* const lit_rows[3] = {take(width), take(width), take(width)};
+  uint8_t *const norm = take(width), *const exceeds = take(width),
+                 *const padded = take(width + 2 * kMajorityReach);
+  uint8_t* const mask = take(pixels + kBitsRead);
+
+  const auto add_norm = [&](int row) {
+    const size_t start = static_cast<size_t>(row) * width;
+    const uint8_t* l[3];
+    for (size_t c = 0; c < 3; ++c) {
+      l[c] = reference.level[c].data() + start;
+      if (!lit) continue;
+      HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, gain[c], lit_rows[c]);
+      l[c] = lit_rows[c];
+    }
+    const uint8_t* const row_of_x[3] = {x[0] + start, x[1] + start, x[2] + start};
+    residual_norm(row_of_x, l, width, norm);
+    pad_row(norm, width, kMeanReach, padded);
+    HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, sums.of(row));
+  };
+  const auto add_count = [&](int row) {
+    HWY_DYNAMIC_DISPATCH(exceed_row)
+    (sums.around(row, height).data(), reference.threshold.data() + static_cast<size_t>(row) * width,
+     width, exceeds);
+    pad_row(exceeds, width, kMajorityReach, padded);
+    HWY_DYNAMIC_DISPATCH(sum_seven_columns)(padded, width, counts.of(row));
+  };
+  int norms = 0, counted = 0;
+  for (int row = 0; row < height; ++row) {
+    for (; counted < std::min(height, row + kMajorityReach + 1); ++counted) {
+      for (; norms < std::min(height, counted + kMeanReach + 1); ++norms) add_norm(norms);
+      add_count(counted);
+    }
+    HWY_DYNAMIC_DISPATCH(most_row)
+    (counts.around(row, height).data(), width, mask + static_cast<size_t>(row) * width);
+  }
+  std::memset(mask + pixels, 0, kBitsRead);
+  HWY_DYNAMIC_DISPATCH(pack_bits)(mask, pixels, bits);
+}
+
+Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+                 int step) {
+  // Where less fits, the gain would be of what moves.
+  constexpr double kLeastShare = 0.1;
+  Gain refined = gain;
+  for (int round = 0; round < 2; ++round) {
+    double product[3] = {0, 0, 0}, square[3] = {0, 0, 0};
+    size_t fit = 0, seen = 0;
+    for (int row = 0; row < reference.height; row += step)
+      for (int col = 0; col < reference.width; col += step, ++seen) {
+        const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
+                       static_cast<size_t>(col);
+        float squared = 0;
+        int brightest = 0;
+        for (size_t c = 0; c < 3; ++c) {
+          const float away =
+              static_cast<float>(x[c][p]) - static_cast<float>(reference.level[c][p]) * refined[c];
+          squared += away * away;
+          brightest = std::max<int>(brightest, x[c][p]);
+        }
+        const float limit = reference.threshold[p];
+        if (squared >= limit * limit || brightest >= 250) continue;
+        ++fit;
+        for (size_t c = 0; c < 3; ++c) {
+          product[c] += x[c][p] * reference.level[c][p];
+          square[c] += reference.level[c][p] * reference.level[c][p];
+        }
+      }
+    if (static_cast<double>(fit) < kLeastShare * static_cast<double>(seen)) break;
+    for (size_t c = 0; c < 3; ++c)
+      if (product[c] > 0) refined[c] = static_cast<float>(product[c] / square[c]);
+  }
+  return refined;
+}
+
+void blur(const uint8_t* plane, int width, int height, uint8_t* out) {
+  const auto w = static_cast<size_t>(width);
+  std::vector<uint16_t> memory(w * SumRing::kRows), total(w);
+  std::vector<uint8_t> padded(w + 2 * kMeanReach);
+  SumRing ring(memory.data(), w);
+  int next = 0;
+  for (int row = 0; row < height; ++row) {
+    for (; next < std::min(height, row + kMeanReach + 1); ++next) {
+      pad_row(plane + static_cast<size_t>(next) * w, w, kMeanReach, padded.data());
+      HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded.data(), w, ring.of(next));
+    }
+    HWY_DYNAMIC_DISPATCH(sum_five_rows)(ring.around(row, height).data(), w, total.data());
+    for (size_t x = 0; x < w; ++x)
+      out[static_cast<size_t>(row) * w + x] = static_cast<uint8_t>((total[x] + 12) / 25);
+  }
+}
+
+}  // namespace qdmd
+#endif

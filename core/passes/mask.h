@@ -1,0 +1,45 @@
+// Which pixels of a frame do not fit a background picture.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/channels.h"
+
+namespace qdmd {
+
+// A background picture and how far frames may lie from it; planes of width * height samples.
+struct Reference {
+  int width = 0, height = 0;
+  std::vector<uint8_t> level[kChannels];  // in unit light
+  // Quaternion norm in levels: the mean residual of the 5 x 5 pixels around, above which a pixel is
+  // foreground.
+  std::vector<uint8_t> threshold;
+
+  size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
+};
+
+// A frame's mask is one bit a pixel, set where it is foreground: pixel p in bit p % 8 of byte
+// p / 8. Masks have room for whole runs of 64 pixels.
+constexpr size_t mask_bytes(size_t pixels) { return (pixels + 63) / 64 * 8; }
+inline bool is_masked(const uint8_t* bits, size_t pixel) {
+  return (bits[pixel / 8] >> (pixel % 8) & 1) != 0;
+}
+
+// The mask of a frame: its residual, averaged over 5 x 5 pixels, exceeds the threshold in most of
+// the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes.
+// scratch: mask_scratch_bytes() at an even address, which can serve many calls; threads run this,
+// so it takes no memory.
+void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+               uint8_t* bits, uint8_t* scratch) noexcept;
+size_t mask_scratch_bytes(int width, int height);
+
+// The frame's gain over the reference by least squares on the sampled pixels that fit it under
+// `gain`; `gain` itself where too few do.
+Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain, int step);
+
+// out[p] = the mean of the 5 x 5 samples around p; the border's samples stand for those outside.
+void blur(const uint8_t* plane, int width, int height, uint8_t* out);
+
+}  // namespace qdmd

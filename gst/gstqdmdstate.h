@@ -1,0 +1,50 @@
+// What qdmdbackground keeps from one call to the next.
+#pragma once
+
+#include <gst/video/gstvideofilter.h>
+
+#include <mutex>
+#include <vector>
+
+#include "core/engine/engine.h"
+#include "gst/backgroundsample.h"
+#include "gst/frameio.h"
+#include "gst/gstqdmdbackground.h"
+#include "gst/gstqdmdsettings.h"
+#include "gst/pointers.h"
+#include "gst/solvereport.h"
+
+namespace qdmd {
+
+struct State {
+  // Protected by the object lock.
+  Settings settings;
+  GstClockTime latency = 0;
+  Counters counters;
+  bool reset_asked = false;
+  SolveReport report;
+
+  // Held while the engine works, by the streaming thread and by who asks for the background; never
+  // while something is pushed, queried or posted. The object lock may be taken inside it.
+  std::mutex engine_lock;
+  // Protected by the engine lock.
+  Engine engine;
+  FrameIo io;
+  BackgroundSample background;
+
+  // Protected by the stream lock.
+  // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
+  // upstream's pools never wait for a window.
+  BufferQueue shells;
+  std::vector<guint8> mask, residual;  // for regions
+  guint64 solves_told = 0;
+  guint warned = 0;                             // settings without effect, a bit for each id
+  GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
+};
+
+}  // namespace qdmd
+
+struct _GstQdmdBackground {
+  GstVideoFilter parent;
+  qdmd::State* state;
+};
