@@ -1,5 +1,5 @@
-# What the scripts of this folder share. They source it from where they are, and are then in the root
-# of the project. Elements come from build/gst; what a script measures stays in $results.
+# What the scripts of this folder share. It takes them to the root of the project and gives them the
+# elements of build/gst. What a script measures stays in $results.
 
 # Programs of the tests know the plugin by the path without links, and refuse another.
 cd -P "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -38,7 +38,7 @@ street_video() {
   done
 }
 
-# frames_of VIDEO FOLDER: every fourth frame of the street scene.
+# frames_of VIDEO FOLDER: 2.5 frames of each second.
 frames_of() {
   mkdir -p "$2"
   gst-launch-1.0 -q filesrc location="$1" ! decodebin ! videoconvert ! videorate ! \
