@@ -12,7 +12,7 @@ import matplotlib
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt
 
-from page_tables import figure, table
+from page import figure, machine, put, read, table
 
 PEERS = (('robust', 'method=robust'), ('qdmd', 'method=qdmd'), ('qdmd_rank_1', 'method=qdmd rank=1'),
          ('qdmd_live', 'method=qdmd mode=live'), ('segmentation', 'segmentation'), ('mog2', 'OpenCV MOG2'),
@@ -34,8 +34,7 @@ class Results:
         self.gram = self.benchmarks('gram', r'(.+)')
 
     def text(self, name):
-        with open(os.path.join(self.folder, name)) as file:
-            return file.read()
+        return read(os.path.join(self.folder, name))
 
     def benchmarks(self, name, pattern):
         """{what the pattern finds, numbers as such: counters}"""
@@ -189,16 +188,6 @@ def live_table(results):
     return table(['what', 'measured', 'promised'], rows)
 
 
-def machine(results):
-    with open('/proc/cpuinfo') as file:
-        model = re.search(r'model name\s*: (.*)', file.read())
-    load = [re.search(r'load average: (.*)', results.text(f'load-{when}')).group(1)
-            for when in ('before', 'after')]
-    return (f'{model.group(1) if model else "unknown processor"}, {os.cpu_count()} cores; load '
-            f'averages over 1, 5 and 15 minutes {load[0]} before and {load[1]} after. A load above '
-            'what the benchmark itself makes means that others used the machine.')
-
-
 def lines(axis, results, cases, horizontal):
     for (name, title), colour in zip(PEERS, COLOURS):
         points = sorted((horizontal(case), run[f'net/{name}'])
@@ -245,27 +234,19 @@ def plot(path, results, cases, horizontal, title, label):
 def main():
     page, plots, folder = sys.argv[1:]
     results = Results(folder)
-    with open(page) as file:
-        text = file.read()
-
-    def put(name, content):
-        nonlocal text
-        start, end = f'<!-- {name} -->', f'<!-- end of {name} -->'
-        text, count = re.subn(re.escape(start) + '.*?' + re.escape(end),
-                              lambda _: f'{start}\n{content.strip()}\n{end}', text, flags=re.S)
-        if count != 1:
-            sys.exit(f'{page} has no place for {name}')
-
-    put('machine', machine(results))
-    put('promises', promises(results))
-    put('peers', peers_table(results, 'net'))
-    put('processor', peers_table(results, 'cpu'))
-    put('stages', stages_table(results))
-    put('bounds', bounds_table(results))
-    put('passes', passes_table(results))
-    put('gram', gram_table(results))
-    put('adjoint', results.text('adjoint.txt').partition('\n\n')[2])
-    put('live', live_table(results))
+    put(page, {
+        'machine': machine(folder) + ' A load above what the benchmark itself makes means that '
+                   'others used the machine.',
+        'promises': promises(results),
+        'peers': peers_table(results, 'net'),
+        'processor': peers_table(results, 'cpu'),
+        'stages': stages_table(results),
+        'bounds': bounds_table(results),
+        'passes': passes_table(results),
+        'gram': gram_table(results),
+        'adjoint': results.text('adjoint.txt').partition('\n\n')[2],
+        'live': live_table(results),
+    })
 
     plot(os.path.join(plots, 'size.svg'), results,
          [case for case in results.element if case[2] == 100], lambda case: case[0] * case[1],
@@ -273,8 +254,6 @@ def main():
     plot(os.path.join(plots, 'window.svg'), results,
          [case for case in results.element if case[:2] == (320, 240)], lambda case: case[2],
          'window-size, 320x240', lambda case: str(case[2]))
-    with open(page, 'w') as file:
-        file.write(text)
 
 
 main()

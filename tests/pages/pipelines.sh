@@ -1,15 +1,11 @@
 #!/usr/bin/env bash
 # Makes the pictures of examples/pipelines.md from simulated scenes.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+source "$(dirname "$0")/common.sh"
 
 tests/install-dependencies.sh build test
-again=()
-[ ! -f build/build.ninja ] || again=(--reconfigure)
-meson setup "${again[@]}" build -Dscene=enabled >/dev/null
-ninja -C build gst/libgstqdmd.so gst/libgstqdmdscene.so
+build gst/libgstqdmd.so gst/libgstqdmdscene.so
 
-export GST_PLUGIN_PATH_1_0="$PWD/build/gst" GST_REGISTRY_1_0="$PWD/build/docs-registry.bin"
 pictures=docs/images/pipelines
 mkdir -p "$pictures"
 caps="video/x-raw,format=RGBA,width=320,height=240"

@@ -3,22 +3,13 @@
 # folder that has SBI, SBMnet and CDnet. Takes a few minutes; stopped and started again, it goes on
 # where it was. Backgrounds and contact sheets stay in build/evaluation.
 set -euo pipefail
-cd "$(dirname "$0")/.."
-
-if [ -z "${QDMD_DATA:-}" ] && [ -d ../shared/data ]; then QDMD_DATA=$(cd ../shared/data && pwd); fi
-[ -d "${QDMD_DATA:-}/SBI" ] ||
-  { echo "Set QDMD_DATA to the folder that has SBI, SBMnet and CDnet." >&2; exit 1; }
+source "$(dirname "$0")/common.sh"
+need_sequences
 
 tests/install-dependencies.sh build test demo
-again=()
-[ ! -f build/build.ninja ] || again=(--reconfigure)
-meson setup "${again[@]}" build -Dtests=enabled >/dev/null
-ninja -C build gst/libgstqdmd.so tests/evaluation/qdmd-evaluate
+build gst/libgstqdmd.so tests/evaluation/qdmd-evaluate
 
-results=build/evaluation
 mkdir -p "$results/tables"
-export GST_REGISTRY_1_0="$PWD/$results/registry.bin"
-
 # evaluate NAME ARGUMENT...: a table of $results/tables, and finished jobs for the next time.
 evaluate() {
   local name=$1
@@ -57,21 +48,15 @@ for folder in "$QDMD_DATA"/{SBI,SBMnet,CDnet}/*/; do
   done
 done
 
-# The only pictures that may be shown here: Debian's street scene. It has no truth, which the
-# program says and ends with 1.
+# It has no truth, which the program says and ends with 1.
 street=$results/street
-video=$QDMD_DATA/videos/vtest.avi
-[ -f "$video" ] || video=build/vtest.avi
-if [ -f "$video" ]; then
-  mkdir -p "$street/input"
-  gst-launch-1.0 -q filesrc location="$video" ! decodebin ! videoconvert ! videorate ! \
-    video/x-raw,framerate=5/2 ! jpegenc quality=95 ! multifilesink location="$street/input/%06d.jpg"
+video=$(street_video)
+if [ -n "$video" ]; then
+  frames_of "$video" "$street/input"
   build/tests/evaluation/qdmd-evaluate --dataset "$street" --methods robust,qdmd,median,mog2 \
     --output-dir "$street/out" >/dev/null || [ -f "$street/out/street_sheet.png" ]
-  gst-launch-1.0 -q filesrc location="$street/out/street_sheet.png" ! pngdec ! videoconvert ! \
-    videoscale method=lanczos ! video/x-raw,width=1200,pixel-aspect-ratio=1/1 ! \
-    jpegenc quality=82 ! filesink location=docs/images/evaluation-street.jpg
+  shrink "$street/out/street_sheet.png" 1200 docs/images/evaluation-street.jpg
 fi
 
-/usr/bin/python3 docs/evaluation_page.py docs/evaluation.md docs/paper-tables.csv \
+/usr/bin/python3 tests/pages/evaluation_page.py docs/evaluation.md tests/pages/paper-tables.csv \
   docs/images/evaluation-spread.svg "$results/tables"

@@ -7,11 +7,10 @@ import glob
 import json
 import math
 import os
-import re
 import statistics
 import sys
 
-from page_tables import table
+from page import put, table
 
 MEASURES = ('AGE', 'pEPs', 'pCEPs', 'MSSSIM', 'PSNR', 'CQM')
 DERIVED = ('Board', 'Foliage', 'office')  # whose truth was computed from masks
@@ -245,21 +244,11 @@ def main():
     runs = load(folder)
     with open(paper_csv) as file:
         paper = list(csv.DictReader(file))
-    tables = {
+    put(page, {
         'overview': overview(runs), 'coupling': coupling(runs), 'spread': spread(runs),
         'pictures': pictures(runs), 'masks': masks(runs), 'paper': beside_paper(runs, paper),
         'published': published(paper), 'measures': six_measures(runs),
-    }
-    with open(page) as file:
-        text = file.read()
-    for name, content in tables.items():
-        start, end = f'<!-- {name} -->', f'<!-- end of {name} -->'
-        text, count = re.subn(re.escape(start) + '.*?' + re.escape(end),
-                              lambda _: f'{start}\n{content}\n{end}', text, flags=re.S)
-        if count != 1:
-            sys.exit(f'{page} has no place for {name}')
-    with open(page, 'w') as file:
-        file.write(text)
+    })
     plot(runs, paper, plot_svg)
 
 

@@ -4,13 +4,12 @@ plots. Says which of the promised growths and errors do not hold.
 Usage: accuracy_page.py PAGE PLOT_FOLDER RESULTS
 """
 import os
-import re
 import sys
 
 import accuracy_plots
 import accuracy_results as results
 from accuracy_results import Setting, WHOLE
-from page_tables import figure, table
+from page import figure, machine, put, read, table
 
 SCENES = (('real', 'real'), ('scene', 'scenes'))
 
@@ -197,20 +196,10 @@ def budget_table(rows):
                   'sample step', 'changes'], lines)
 
 
-def machine(folder):
-    def text(name):
-        with open(os.path.join(folder, name)) as file:
-            return file.read()
-
-    with open('/proc/cpuinfo') as file:
-        model = re.search(r'model name\s*: (.*)', file.read())
-    load = [re.search(r'load average: (.*)', text(f'load-{when}')).group(1).strip()
-            for when in ('before', 'after')]
+def conditions(folder):
     seconds = os.path.join(folder, 'seconds')
-    took = f' It took {int(text("seconds")) / 60:.0f} minutes.' if os.path.exists(seconds) else ''
-    return (f'{model.group(1) if model else "unknown processor"}, {os.cpu_count()} cores; load '
-            f'averages over 1, 5 and 15 minutes {load[0]} before and {load[1]} after.{took} A load '
-            'above 1 means that others used the machine.')
+    took = f' It took {int(read(seconds)) / 60:.0f} minutes.' if os.path.exists(seconds) else ''
+    return f'{machine(folder)}{took} A load above 1 means that others used the machine.'
 
 
 def clips(rows):
@@ -226,33 +215,22 @@ def clips(rows):
 def main():
     page, plots, folder = sys.argv[1:]
     rows = results.read(os.path.join(folder, 'table.csv'))
-    with open(page) as file:
-        text = file.read()
-
-    def put(name, content):
-        nonlocal text
-        start, end = f'<!-- {name} -->', f'<!-- end of {name} -->'
-        text, count = re.subn(re.escape(start) + '.*?' + re.escape(end),
-                              lambda _: f'{start}\n{content.strip()}\n{end}', text, flags=re.S)
-        if count != 1:
-            sys.exit(f'{page} has no place for {name}')
-
     checks = results.checks(rows)
     quality = Quality(rows)
-    put('machine', machine(folder))
-    put('clips', clips(rows))
-    put('wishes', quality.wishes())
-    put('front', quality.front())
-    put('knobs', quality.knobs())
-    put('digits', quality.digits())
-    put('sampling', sampling_table(rows))
-    put('checks', table(['what', 'measured', 'promised', 'holds'],
-                        [[*check[:3], '**no**' if check[3] == 'no' else check[3]] for check in checks]))
-    put('solvers', solvers_table(rows))
-    put('growth', growth_table(rows))
-    put('budget', budget_table(rows))
-    with open(page, 'w') as file:
-        file.write(text)
+    put(page, {
+        'machine': conditions(folder),
+        'clips': clips(rows),
+        'wishes': quality.wishes(),
+        'front': quality.front(),
+        'knobs': quality.knobs(),
+        'digits': quality.digits(),
+        'sampling': sampling_table(rows),
+        'checks': table(['what', 'measured', 'promised', 'holds'],
+                        [[*check[:3], '**no**' if check[3] == 'no' else check[3]] for check in checks]),
+        'solvers': solvers_table(rows),
+        'growth': growth_table(rows),
+        'budget': budget_table(rows),
+    })
     accuracy_plots.draw(plots, rows)
     for what, measured, promised, holds in checks:
         print(f'{"holds" if holds == "yes" else "DOES NOT HOLD (" + holds + ")"}: {what}: '

@@ -2,11 +2,11 @@
 # Puts the tables and plots of docs/performance.md anew, in less than ten minutes on an idle
 # machine. What the programs print stays in build/performance.
 #
-#   docs/make-performance.sh [--short | --page]
+#   tests/pages/performance.sh [--short | --page]
 #
 # --short: two minutes, to try the script; its numbers say little. --page: from the results of last time.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+source "$(dirname "$0")/common.sh"
 
 form=${1:-whole}
 case "$form" in
@@ -14,20 +14,15 @@ case "$form" in
   --short) turns=1 min_time=0.01 live=5 memory=20 adjoint=(--short)
     cases='(160x120|320x240)/.*' ;;
   --page) ;;
-  *) echo "usage: docs/make-performance.sh [--short | --page]" >&2; exit 2 ;;
+  *) echo "usage: tests/pages/performance.sh [--short | --page]" >&2; exit 2 ;;
 esac
 
 tests/install-dependencies.sh build test docs
-results=build/performance
-mkdir -p "$results"
 
 if [ "$form" != --page ]; then
-  again=()
-  [ ! -f build/build.ninja ] || again=(--reconfigure)
-  meson setup "${again[@]}" build -Dtests=enabled >/dev/null
   bench=build/tests/bench
-  ninja -C build gst/libgstqdmd.so "${bench#build/}"/{element,stages,passes,gram,adjoint,live}
-  export GST_REGISTRY_1_0="$PWD/$results/registry.bin" QDMD_BENCH_TURNS=$turns
+  build gst/libgstqdmd.so "${bench#build/}"/{element,stages,passes,gram,adjoint,live}
+  export QDMD_BENCH_TURNS=$turns
 
   # step NAME COMMAND...: what a program prints, in $results/NAME; what it says meanwhile is shown.
   step() {
@@ -61,4 +56,4 @@ if [ "$form" != --page ]; then
 fi
 
 mkdir -p docs/images/performance
-/usr/bin/python3 docs/performance_page.py docs/performance.md docs/images/performance "$results"
+/usr/bin/python3 tests/pages/performance_page.py docs/performance.md docs/images/performance "$results"

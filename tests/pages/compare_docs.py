@@ -7,15 +7,14 @@ import re
 import subprocess
 import sys
 
+from page import block
+
 page, maker, *program = sys.argv[1:]
-text = pathlib.Path(page).read_text()
-reference = re.search('<!-- reference -->(.*)<!-- end of reference -->', text, re.S)
-if not reference:
-    sys.exit(f'{page} has no place for the reference')
+reference = block(page, 'reference')
 printed = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True).stdout
-if reference.group(1).strip() != printed.strip():
+if reference != printed.strip():
     sys.exit(f'{page} does not match what {program[-1]} prints: run {maker}')
-missing = [name for name in re.findall(r'\]\((images/[^)]*)\)', text)
+missing = [name for name in re.findall(r'\]\((images/[^)]*)\)', pathlib.Path(page).read_text())
            if not (pathlib.Path(page).parent / name).exists()]
 if missing:
     sys.exit(f'{page} shows pictures that are not there: {missing}')
