@@ -1,4 +1,5 @@
-// The time budget: what it chooses from what it measured, and whether that comes true.
+// The time budget: what it chooses from what it measured. Times are made up: a slow machine changes
+// nothing here.
 #include "core/background/time_budget.h"
 
 #include <chrono>
@@ -108,11 +109,53 @@ TEST(TimeBudget, TakesTheBestThatFits) {
     Machine machine(allowed);
     machine.run(400);
     EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
+    // What the first stretches took too much is paid back to the last second.
     if (allowed > 0.0016) {
-      EXPECT_LE(machine.seconds / (10 * machine.stretches), 1.01 * allowed) << allowed;
+      EXPECT_LE(machine.seconds / (10 * machine.stretches), allowed) << allowed;
     }
-    EXPECT_NEAR(machine.solves, 400.0 / chosen.period, 3);
+    // Before the first stretch nobody knows what a solve takes, and after it some wait.
+    EXPECT_NEAR(machine.solves, 400.0 / chosen.period, 1);
     EXPECT_LE(machine.oldest_age, TimeBudget::kMostPeriod);
+  }
+}
+
+// Sums of up to 640 stretches, whose times the model has met 160 times before: 0.75^160 of its
+// first guess is left.
+double rounding_of(double predicted) { return 640 * kEpsilon * predicted; }
+
+TEST(TimeBudget, ThePredictionComesTrue) {
+  for (const auto& [allowed, chosen] : {std::pair{0.0, kFront[0]},
+                                        {0.0165, kFront[0]},
+                                        {0.0155, kFront[1]},
+                                        {0.0108, kFront[2]},
+                                        {0.0093, kFront[3]},
+                                        {0.0053, kFront[5]},
+                                        {0.0048, kFront[6]},
+                                        {0.0018, kFront[10]},
+                                        {0.0005, kFront[11]}}) {
+    Machine machine(allowed);
+    machine.run(160);
+    EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
+    // Whole periods of any effort.
+    const double measured = machine.mean_of(480), predicted = machine.budget.predicted();
+    EXPECT_NEAR(measured, predicted, rounding_of(predicted)) << allowed;
+    if (allowed > 0.0016) {
+      EXPECT_LE(predicted, allowed);
+    }
+  }
+}
+
+// What one effort took says what others take, once it is known what a frame takes without a solve.
+TEST(TimeBudget, TheModelForetellsOtherEfforts) {
+  for (const double allowed : {0.0, 0.0093, 0.0048}) {
+    Machine machine(allowed);
+    machine.run(160);
+    for (const Effort& other : kFront) {
+      Machine fixed(0, {other});
+      fixed.run(160);
+      const double measured = fixed.mean_of(480);
+      EXPECT_NEAR(machine.budget.predicted(other), measured, rounding_of(measured)) << allowed;
+    }
   }
 }
 
@@ -135,7 +178,7 @@ TEST(TimeBudget, TheFirstStretchIsPaidBack) {
   machine.run(1);
   EXPECT_GT(machine.seconds / 10, 2 * 0.004);
   machine.run(19);
-  EXPECT_LE(machine.seconds / 200, 1.05 * 0.004);
+  EXPECT_LE(machine.seconds / 200, 0.004);
 }
 
 // Measurements that waver by a tenth: the choice changes at the beginning, then hardly ever.
@@ -162,7 +205,7 @@ TEST(TimeBudget, ALoadIsKnownAfterTwoStretches) {
   machine.slow_down(2);
   machine.run(2);
   EXPECT_GE(machine.budget.effort().period, 4);
-  EXPECT_LE(machine.mean_of(40), 1.05 * 0.0055);
+  EXPECT_LE(machine.mean_of(40), 0.0055);
   EXPECT_NEAR(machine.budget.effort().period, 5, 1);
   machine.slow_down(0.5);
   machine.run(20);
@@ -237,24 +280,26 @@ TEST(TimeBudget, StretchesOfOtherLengthsAreOfTheSameSolve) {
 
 // ---- In the engine ----
 
-// Frames of real work: the cost model against the clock. Times are those of this machine at this
-// moment, so they are compared with each other only.
+// Seconds that a frame takes beside the engine, which is told of them: a clock of the test's own.
+// What the engine itself takes does not show beside them, however slow the machine is.
+constexpr double kBeside = 1e6, kBesideEngine = 1e-3 * kBeside;
+
+// Frames of real work.
 class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
  protected:
   static constexpr int kSide = 128, kFrames = 240;
 
   struct Outcome {
     uint64_t solves = 0;
-    double predicted = 0, measured = 0;  // seconds a frame; the latter of the second half
-    Effort effort;
     TimeBudget model;
+    std::vector<SolveReport> reports;  // of each solve
+    double seconds = 0;                // in all of push() and pop()
     std::vector<std::vector<uint8_t>> pictures;
   };
-  // seconds: allowed for each frame; 0: no limit.
-  static Outcome run(double seconds, int iterations = 1, int sample_step = 0) {
+  // allowed: seconds for each frame; 0: no limit.
+  static Outcome run(double allowed, int iterations = 1, int count = kFrames) {
     EngineOptions options;
     options.iterations = iterations;
-    options.sample_step = sample_step;
     options.mode = std::get<0>(GetParam());
     options.dmd.method = std::get<1>(GetParam());
     options.window_size = 20;
@@ -262,7 +307,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     options.threads = 1;
     Engine engine;
     EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
-    engine.set_time_budget(seconds);
+    engine.set_time_budget(allowed);
     std::mt19937 rng(7);
     std::vector<Picture> frames;
     for (int k = 0; k < 12; ++k) {
@@ -273,8 +318,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     }
     Outcome outcome;
     Picture out(kSide, kSide);
-    double total = 0;
-    for (int t = 0; t < kFrames; ++t) {
+    for (int t = 0; t < count; ++t) {
       const auto start = std::chrono::steady_clock::now();
       EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in()).ok());
       int ready = 0;
@@ -282,68 +326,66 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
         engine.pop(Output::background, out.out());
         outcome.pictures.push_back({});
       }
-      if (t >= kFrames / 2)
-        total += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      outcome.seconds +=
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      engine.add_time(kBeside);
       if (ready > 0) outcome.pictures.back() = out.planes();
+      if (engine.solves() > outcome.reports.size()) outcome.reports.push_back(engine.report());
     }
-    outcome.measured = total / (kFrames - kFrames / 2);
     outcome.solves = engine.solves();
-    outcome.predicted = engine.time_budget().predicted();
-    outcome.effort = engine.time_budget().effort();
     outcome.model = engine.time_budget();
     return outcome;
   }
 };
 
-TEST_P(BudgetOfEngine, ThePredictionComesTrueWithinHalfAsMuch) {
-  // The machine may be disturbed: one of three tries must do.
-  double worst = 0;
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    const Outcome free = run(0);
-    const Outcome limited = run(0.6 * free.measured);
-    EXPECT_EQ(free.pictures.size(), static_cast<size_t>(kFrames));
-    EXPECT_EQ(limited.pictures.size(), static_cast<size_t>(kFrames)) << "no frame is lost";
-    EXPECT_EQ(free.effort.period, 1);
-    worst = 0;
-    for (const Outcome& outcome : {free, limited})
-      worst = std::max(
-          {worst, outcome.predicted / outcome.measured, outcome.measured / outcome.predicted});
-    if (worst < 1.5 && limited.effort != free.effort && limited.measured < free.measured) return;
-  }
-  FAIL() << "off by a factor of " << worst;
+TEST_P(BudgetOfEngine, WhatFramesTakeBesideTheEngineCounts) {
+  const TimeBudget model = run(0).model;
+  EXPECT_NEAR(model.predicted(), kBeside, kBesideEngine);
+  EXPECT_EQ(model.effort().period, 1);
+  // A frame takes it with a solve and without.
+  EXPECT_NEAR(model.predicted({TimeBudget::kMostPeriod, 1, 1}), kBeside, kBesideEngine);
+}
+
+// So little that a single frame forbids the next solves.
+TEST_P(BudgetOfEngine, WhereNothingFitsSolvesAreRareAndNoFrameIsLost) {
+  // In live mode a solve says what solves take only when the window is full.
+  constexpr int kCount = 360;
+  const Outcome free = run(0, 1, kCount), limited = run(1e-3 * kBeside, 1, kCount);
+  EXPECT_EQ(free.pictures.size(), static_cast<size_t>(kCount));
+  EXPECT_EQ(limited.pictures.size(), static_cast<size_t>(kCount)) << "no frame is lost";
+  EXPECT_EQ(limited.model.effort().period, TimeBudget::kMostPeriod);
+  EXPECT_EQ(limited.solves, 1 + (free.solves - 1) / TimeBudget::kMostPeriod);
 }
 
 TEST_P(BudgetOfEngine, WithRoomForEverythingNothingChanges) {
-  const Outcome free = run(0), wide = run(3600);
+  const Outcome free = run(0), wide = run(2 * kBeside);
+  EXPECT_EQ(wide.model.effort().period, 1);
   EXPECT_EQ(free.solves, wide.solves);
   EXPECT_EQ(free.pictures, wide.pictures);
 }
 
-class BudgetOfRobust : public BudgetOfEngine {};
-
-// What one effort took says what others take.
-TEST_P(BudgetOfRobust, TheModelForetellsOtherEfforts) {
-  double worst = 0;
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    const TimeBudget model = run(0, 3, 1).model;
-    worst = 0;
-    for (const Effort& other : {Effort{1, 1, 1}, Effort{1, 3, 4}, Effort{1, 1, 4}}) {
-      const double predicted = model.predicted(other);
-      const double measured = run(0, other.iterations, other.sample_step).measured;
-      worst = std::max({worst, predicted / measured, measured / predicted});
+// On one thread they lie within push() and pop(), one after another, on the same clock.
+TEST_P(BudgetOfEngine, PartsOfACostAreNoMoreThanTheWhole) {
+  const bool robust = std::get<1>(GetParam()) == Method::robust;
+  for (int iterations : {1, 3}) {
+    const Outcome outcome = run(0, iterations);
+    EXPECT_EQ(outcome.reports.size(), outcome.solves);
+    double sum = 0;
+    for (const SolveReport& report : outcome.reports) {
+      EXPECT_GT(report.solve_time, 0);
+      EXPECT_LE(report.cost.sum(), report.solve_time);
+      // Only one method has them.
+      EXPECT_EQ(report.cost.iterations > 0, robust);
+      EXPECT_EQ(report.cost.samples > 0, robust);
+      sum += report.solve_time;
     }
-    if (worst < 1.5) return;
+    EXPECT_LE(sum, outcome.seconds);
   }
-  FAIL() << "off by a factor of " << worst;
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfEngine,
                          testing::Combine(testing::Values(Mode::batch, Mode::live),
                                           testing::Values(Method::robust, Method::qdmd)));
-
-INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfRobust,
-                         testing::Combine(testing::Values(Mode::batch, Mode::live),
-                                          testing::Values(Method::robust)));
 
 // An engine for pictures of a scene that changes in nothing but its light.
 struct Separator {
@@ -385,10 +427,11 @@ TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
     for (int t = 0; t < 100; ++t) {
       separator.push(1);
       separator.pop(1);
+      separator.engine.add_time(kBeside);
     }
     const TimeBudget& model = separator.engine.time_budget();
-    EXPECT_GT(model.predicted({TimeBudget::kMostPeriod, 1, 1}),
-              1.01 * model.predicted({1, 1, 1}) / TimeBudget::kMostPeriod);
+    for (const Effort& effort : {Effort{1, 1, 1}, Effort{TimeBudget::kMostPeriod, 1, 1}})
+      EXPECT_NEAR(model.predicted(effort), kBeside, kBesideEngine);
   }
 }
 
@@ -409,7 +452,7 @@ TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
   }
 }
 
-// Whoever lets go of a frozen background has another one at once, in the light that there is.
+// Who lets go of a frozen background has another one at once, in the light that there is.
 TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
   constexpr int kWindow = 10;
   Separator separator(Mode::batch, kWindow);
