@@ -15,6 +15,10 @@ Clock::Spent Clock::spent() const {
   return spent;
 }
 
+void Clock::charge(Work work, double seconds) {
+  nanoseconds_[work].fetch_add(static_cast<int64_t>(1e9 * seconds), std::memory_order_relaxed);
+}
+
 Clock::Span::Span(Clock& clock, Work work)
     : clock_(clock), work_(work), outer_(innermost), start_(std::chrono::steady_clock::now()) {
   if (outer_) outer_->charge(start_);

@@ -43,6 +43,8 @@ class Clock {
   };
   // Since the clock was made.
   Spent spent() const;
+  // For work that was timed elsewhere.
+  void charge(Work work, double seconds);
 
   // Charges the time that it lives to one kind of work, less that of spans inside it on the same
   // thread.

@@ -5,8 +5,8 @@
 #include <random>
 #include <stdexcept>
 
-#include "core/engine/engine.h"
 #include "core/dmd/decompose.h"
+#include "core/engine/engine.h"
 #include "tests/bench/camera.h"
 #include "tests/core/clips.h"
 #include "tests/core/solver_names.h"

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "core/passes/combine.h"
 #include "core/foreground/foreground.h"
+#include "core/gram/window.h"
+#include "core/passes/combine.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
-#include "core/gram/window.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"
 

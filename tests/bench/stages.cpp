@@ -8,9 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/engine/background.h"
 #include "core/engine/engine.h"
-#include "core/passes/planes.h"
-#include "core/learn/window_solver.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"
 
@@ -49,60 +48,57 @@ class Batch {
         in_(camera_.frame_bytes()),
         out_(camera_.frame_bytes()),
         pool_(c.threads),
-        window_(c.window, static_cast<size_t>(c.width) * static_cast<size_t>(c.height)),
-        solver_(DmdOptions(), EngineOptions().iterations, c.window, c.width, c.height, 1, false,
-                &pool_) {}
+        background_(Learner::make(options(), c.width, c.height),
+                    {&frames_, c.window, false, &pool_, &clock_}) {}
 
   StageTimes run() {
     // One thread's time is what it computed, because others may use the machine.
     const clockid_t clock = c_.threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
     const auto took = [clock](auto&& work) { return seconds_of(work, clock); };
-    window_.clear();
-    solver_.clear();
+    frames_.clear();
     StageTimes times{};
     auto& [conversion, gram, solve, combination, statistics, output] = times;
     for (int t = 0, fresh = 0; t < c_.window; ++t) {
       camera_.render(t, in_.data());
       conversion += took([&] { take_in(); });
       if (++fresh < kGroup && t + 1 < c_.window) continue;
-      gram += took([&] { solver_.add_to_gram(window_, std::exchange(fresh, 0)); });
+      gram +=
+          took([&] { background_.learner().add(frames_.window(), std::exchange(fresh, 0), {}); });
     }
-    solve = took([&] { solver_.decompose(window_); });
-    combination = took([&] { solver_.build(); });
+    solve = took([&] { background_.begin(frames_.window()); });
+    combination = took([&] { background_.build({}); });
     statistics = took([&] {
-      solver_.finish(0);
-      solver_.publish();
+      background_.finish(0);
+      background_.publish();
     });
     for (int t = 0; t < c_.window; ++t) output += took([&] { write(t); });
     return times;
   }
-  const SolveReport& report() const { return solver_.report(); }
+  const SolveReport& report() const { return background_.report(); }
 
  private:
-  void take_in() {
-    const int slot = window_.append();
-    uint8_t* const to[3] = {window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)};
-    split_channels(view_of(c_, std::as_const(in_).data()), 0, c_.height, 255, to);
-    solver_.append(window_);
+  static LearnOptions options() {
+    LearnOptions options;
+    options.method = Method::qdmd;
+    return options;
   }
+  void take_in() { frames_.append(view_of(c_, std::as_const(in_).data())); }
 
   void write(int t) {
-    solver_.model().set_time(t);
-    const int slot = window_.slot(t);
-    const OutputTask task = {
-        {window_.plane(slot, 0), window_.plane(slot, 1), window_.plane(slot, 2)},
-        &solver_.model(),
-        Output::mask,
-        solver_.report().foreground.threshold,
-        solver_.model().limits(),
-        nullptr,
-        255};
-    const size_t bands = std::max<size_t>(1, window_.pixels() / kPixelsPerBand);
-    pool_.run(bands, [&](size_t band) {
-      const auto row = [&](size_t b) {
-        return static_cast<int>(static_cast<size_t>(c_.height) * b / bands);
-      };
-      write_output(task, view_of(c_, out_.data()), row(band), row(band + 1) - row(band));
+    BackgroundModel& model = background_.model();
+    model.set_time(t);
+    const Window& window = frames_.window();
+    const int slot = frames_.slot(t);
+    const OutputTask task = {{window.plane(slot, 0), window.plane(slot, 1), window.plane(slot, 2)},
+                             &model,
+                             Output::mask,
+                             background_.report().foreground.threshold,
+                             model.limits(),
+                             nullptr,
+                             255};
+    const auto bands = static_cast<int>(std::max<size_t>(1, window.pixels() / kPixelsPerBand));
+    for_bands(pool_, c_.height, bands, [&](int first, int count, size_t) {
+      write_output(task, view_of(c_, out_.data()), first, count);
     });
     benchmark::ClobberMemory();
   }
@@ -111,8 +107,9 @@ class Batch {
   Camera camera_;
   std::vector<uint8_t> in_, out_;
   Pool pool_;
-  Window window_;
-  WindowSolver solver_;
+  Clock clock_;
+  FrameStore frames_{c_.window, c_.width, c_.height, {}};
+  Background background_;
 };
 
 void stages(benchmark::State& state, const Case& c) {

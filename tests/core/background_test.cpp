@@ -1,9 +1,9 @@
 // L(t) as real pictures: the temporal model, its 8-bit evaluation, and what is foreground.
 #include "core/model/background_model.h"
 
-#include "core/foreground/foreground.h"
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
+#include "core/foreground/foreground.h"
 #include "tests/core/test_util.h"
 
 namespace qdmd::test {

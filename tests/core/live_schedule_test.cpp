@@ -158,8 +158,8 @@ TEST(LiveSchedule, RestartWithAModelWaitsForAHop) {
       const auto end = static_cast<size_t>(expected[next++].second);
       const size_t size = std::min<size_t>(end, 12);
       FreshModel model(part_of(clip, 31 + end - size, size), options);
-      ASSERT_EQ(spread.picture(), model.background(static_cast<double>(frame - 1) -
-                                                   static_cast<double>(end - size)));
+      ASSERT_EQ(spread.picture(),
+                model.background(static_cast<double>(frame - 1) - static_cast<double>(end - size)));
     }
     EXPECT_GT(next, 1u);
   }

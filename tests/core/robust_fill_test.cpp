@@ -1,7 +1,7 @@
 // The passes of robust Q-DMD over pixels against their definitions, on every instruction set of
 // this machine.
-#include "core/passes/fill.h"
 #include "core/learn/robust/median_picture.h"
+#include "core/passes/fill.h"
 #include "tests/core/robust_util.h"
 #include "tests/core/simd_targets.h"
 

@@ -2,8 +2,8 @@
 #include <numeric>
 
 #include "core/learn/robust/light.h"
-#include "core/passes/patch_density.h"
 #include "core/learn/robust/stable_frames.h"
+#include "core/passes/patch_density.h"
 #include "tests/core/robust_util.h"
 #include "tests/core/simd_targets.h"
 

@@ -35,7 +35,7 @@ struct Errors {
   double mean = 0, worst = 0, median = 0;  // per frame; of the temporal median: mean
 };
 
-Errors errors_of(const char* text, int iterations = 2) {
+Errors errors_of(const char* text, int iterations) {
   const Footage footage(text, kWidth, kHeight, kFrames);
   const auto found = run_engine(footage.frames, kWidth, kHeight, robust_of(kFrames, iterations));
   const auto median = temporal_median(footage.frames);
@@ -49,25 +49,59 @@ Errors errors_of(const char* text, int iterations = 2) {
   return errors;
 }
 
+// What a user gets who sets nothing, and what more effort gives.
+constexpr int kIterations[] = {1, 2};
+
+// A mean of the window's frames with that noise, rounded to 8 bits: 0.8 sigma / sqrt(m) is the mean
+// absolute value of its noise, and rounding moves a level by a quarter on average.
+double noise_left(double sigma) { return 0.8 * sigma / std::sqrt(kFrames) + 0.25; }
+
 // The acceptance line: the light falls by 40 % over the window, and somebody walks.
 TEST(RobustScenes, AFadeIsFollowed) {
-  for (const char* text : {"fade=0.4:duration=20", "fade=0.4:duration=20,noise=2"}) {
-    for (int iterations : {1, 2}) EXPECT_LT(errors_of(text, iterations).worst, 2) << text;
-    EXPECT_GT(errors_of(text).median, 10) << text;
-  }
+  for (int iterations : kIterations)
+    for (const auto& [text, sigma] :
+         {std::pair{"fade=0.4:duration=20", 0.0}, {"fade=0.4:duration=20,noise=2", 2.0}}) {
+      const Errors errors = errors_of(text, iterations);
+      EXPECT_LT(errors.worst, noise_left(sigma)) << text;
+      EXPECT_GT(errors.median, 10) << text;
+    }
 }
 
 TEST(RobustScenes, ALightSwitchIsNoBlend) {
-  const Errors errors = errors_of("light-switch,noise=2");
-  EXPECT_LT(errors.worst, 2);
+  for (int iterations : kIterations) {
+    const Errors errors = errors_of("light-switch,noise=2", iterations);
+    EXPECT_LT(errors.worst, noise_left(2));
+    EXPECT_GT(errors.median, 10);
+  }
 }
 
-// What a camera on a wall sees; each near the truth, and no worse than the median.
+// What a camera on a wall sees. A level in one of a hundred samples is for what the median itself
+// leaves to chance: pixels that are covered half of the time.
 TEST(RobustScenes, AreNoWorseThanTheMedian) {
-  for (const char* text : {"default", "noise=3", "low-rate=5", "stop=8", "abandon", "remove",
-                           "shadow", "camouflage", "bootstrap", "exposure", "flicker"}) {
-    const Errors errors = errors_of(text);
-    EXPECT_LT(errors.mean, std::max(2.0, errors.median)) << text;
+  for (int iterations : kIterations)
+    for (const char* text : {"default", "noise=3", "low-rate=5", "abandon", "remove", "shadow",
+                             "camouflage", "bootstrap", "exposure"}) {
+      const Errors errors = errors_of(text, iterations);
+      EXPECT_LT(errors.mean, errors.median + 0.01) << text;
+    }
+}
+
+// Somebody is at a place for most of the window: the median is him.
+TEST(RobustScenes, AreBetterThanTheMedianWhereSomebodyStays) {
+  for (int iterations : kIterations)
+    for (const char* text : {"stop=8", "abandon"}) {
+      const Errors errors = errors_of(text, iterations);
+      EXPECT_LT(errors.worst, 0.01) << text;
+      EXPECT_GT(errors.median, 0.4) << text;
+    }
+}
+
+// The background has two states, and no still picture is both. The one that is there a third of
+// the time is half again as far from the truth as their mean.
+TEST(RobustScenes, AFlickerIsOneOfItsStates) {
+  for (int iterations : kIterations) {
+    const Errors errors = errors_of("flicker", iterations);
+    EXPECT_LT(errors.mean, 1.5 * errors.median);
   }
 }
 
@@ -119,8 +153,10 @@ TEST(RobustScenes, AShakingCameraIsAsSharpAsTheMedian) {
         sample = static_cast<uint8_t>(std::lround(std::clamp(sample + noise(rng), 0.0, 255.0)));
     }
     const double median = gradient_energy(temporal_median(clip), kW, kH);
-    const double robust = gradient_energy(run_engine(clip, kW, kH, robust_of(80))[40], kW, kH);
-    EXPECT_GE(robust, median) << reach << " pixels";
+    for (int iterations : kIterations) {
+      const auto found = run_engine(clip, kW, kH, robust_of(80, iterations));
+      EXPECT_GE(gradient_energy(found[40], kW, kH), median) << reach << " pixels";
+    }
   }
 }
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "core/passes/grid.h"
 #include "core/parallel/pool.h"
+#include "core/passes/grid.h"
 #include "tests/core/engine_util.h"
 
 namespace qdmd::test {

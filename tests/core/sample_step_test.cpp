@@ -202,30 +202,32 @@ TEST(SampleStep, SamplesAfterAFreeze) {
 
 // ---- What it costs ----
 
-TEST(SampleStep, BytesOfTheLayout) {
+TEST(SampleStep, BytesOfTheFrames) {
   auto options = window_of(10);
-  // Planes are padded to 64 bytes.
-  EXPECT_EQ(layout_of(options, 640, 480).bytes, uint64_t{10} * 3 * 640 * 480);
+  // Planes are padded to 64 bytes; each frame has two bytes that say what its alpha is.
+  const auto frames = [](int count, uint64_t samples) {
+    return uint64_t(count) * (3 * samples + 2);
+  };
+  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480));
   EXPECT_EQ(layout_of(options, 640, 480).capacity, 10);
-  EXPECT_EQ(layout_of(options, 1, 1).bytes, 10u * 3 * 64);
+  EXPECT_EQ(layout_of(options, 1, 1).frame_bytes, frames(10, 64));
   options.sample_step = 1;
-  EXPECT_EQ(layout_of(options, 640, 480).bytes, uint64_t{10} * 3 * 640 * 480);
+  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480));
   options.sample_step = 2;
-  EXPECT_EQ(layout_of(options, 640, 480).bytes, uint64_t{10} * 3 * (640 * 480 + 320 * 240));
-  EXPECT_EQ(layout_of(options, 641, 481).bytes,
-            uint64_t{10} * 3 * ((641 * 481 + 63) / 64 * 64 + (321 * 241 + 63) / 64 * 64));
+  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480 + 320 * 240));
+  EXPECT_EQ(layout_of(options, 641, 481).frame_bytes,
+            frames(10, (641 * 481 + 63) / 64 * 64 + (321 * 241 + 63) / 64 * 64));
   options.sample_step = 64;
-  EXPECT_EQ(layout_of(options, 5, 5).bytes, 10u * 3 * (64 + 64));
+  EXPECT_EQ(layout_of(options, 5, 5).frame_bytes, frames(10, 64 + 64));
   EXPECT_EQ(layout_of(options, 5, 5).sample_step, 64);
   // Small live windows need nothing beside; of large frames, those that arrive during a solve.
   options = live_of(10);
   EXPECT_EQ(layout_of(options, 640, 480).capacity, 10);
   options = live_of(100, 25);
   const EngineLayout layout = layout_of(options, 1920, 1080);
-  EXPECT_EQ(layout.capacity,
-            100 + LivePlan(100, 25, uint64_t{3} * 1920 * 1080).most_late_frames());
+  EXPECT_EQ(layout.capacity, 100 + LivePlan(100, 25, uint64_t{3} * 1920 * 1080).most_late_frames());
   EXPECT_GT(layout.capacity, 100);
-  EXPECT_EQ(layout.bytes, static_cast<uint64_t>(layout.capacity) * 3 * 1920 * 1080);
+  EXPECT_EQ(layout.frame_bytes, frames(layout.capacity, 1920 * 1080));
 }
 
 TEST(SampleStep, ChosenStepIsOneWhereDigitsMatter) {

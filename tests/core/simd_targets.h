@@ -7,7 +7,7 @@
 
 #include <cstring>
 
-// As in core/background: without it the list would name targets that no pass is built for.
+// As in core/passes/simd.h: without it the list would name targets that no pass is built for.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/targets.h>
 

@@ -1,4 +1,5 @@
-// The time budget: what it chooses from what it measured, and whether that comes true.
+// The time budget: what it chooses from what it measured. Times are made up: a slow machine changes
+// nothing here.
 #include "core/engine/time_budget.h"
 
 #include <chrono>
@@ -9,14 +10,13 @@
 namespace qdmd::test {
 namespace {
 
-// Of up to two iterations at step 2 and 480 pixels along the short side.
-const std::vector<Effort> kFront = front_of_efforts({1, 2, 2}, true, 640, 480);
+const std::vector<Effort> kFront = front_of_efforts({2, 4, 8, 16});
 
 // Stretches of 10 frames on a machine on which a frame takes `frame` seconds, and a solve `once`,
-// `iteration` for each iteration and `samples` for those of an iteration at step 2.
+// and `samples` for those at step 2.
 struct Machine {
   TimeBudget budget;
-  double frame = 0.001, once = 0.05, iteration = 0.03, samples = 0.02;
+  double frame = 0.001, once = 0.08, samples = 0.02;
   int solves = 0, stretches = 0, newest_age = 0, oldest_age = 0;
   double seconds = 0;
 
@@ -33,8 +33,7 @@ struct Machine {
       if (budget.next()) {
         const Effort& effort = budget.effort();
         const double share = 4.0 / (effort.sample_step * effort.sample_step);
-        solve = {once * f, effort.iterations * iteration * f,
-                 effort.iterations * samples * share * f};
+        solve = {once * f, samples * share * f};
         ++solves;
         newest_age = 0;
       }
@@ -46,7 +45,7 @@ struct Machine {
     }
   }
   void slow_down(double factor) {
-    for (double* part : {&frame, &once, &iteration, &samples}) *part *= factor;
+    for (double* part : {&frame, &once, &samples}) *part *= factor;
   }
   // Seconds a frame of the next `count` stretches.
   double mean_of(int count, double noise = 0, uint32_t seed = 1) {
@@ -56,31 +55,40 @@ struct Machine {
   }
 };
 
-TEST(FrontOfEfforts, GivesUpIterationsThenSamplesThenSolves) {
-  ASSERT_EQ(kFront.size(), 12u);
-  EXPECT_EQ(kFront[0], (Effort{1, 2, 2}));
-  EXPECT_EQ(kFront[1], (Effort{1, 1, 2}));
-  EXPECT_EQ(kFront[2], (Effort{1, 1, 4}));
-  EXPECT_EQ(kFront[3], (Effort{1, 1, 8}));
-  EXPECT_EQ(kFront[4], (Effort{1, 1, 16}));
-  EXPECT_EQ(kFront[5], (Effort{2, 1, 16}));
-  EXPECT_EQ(kFront.back(), (Effort{TimeBudget::kMostPeriod, 1, 16}));
+TEST(FrontOfEfforts, GivesUpSamplesThenSolves) {
+  ASSERT_EQ(kFront.size(), 11u);
+  EXPECT_EQ(kFront[0], (Effort{1, 2}));
+  EXPECT_EQ(kFront[1], (Effort{1, 4}));
+  EXPECT_EQ(kFront[2], (Effort{1, 8}));
+  EXPECT_EQ(kFront[3], (Effort{1, 16}));
+  EXPECT_EQ(kFront[4], (Effort{2, 16}));
+  EXPECT_EQ(kFront.back(), (Effort{TimeBudget::kMostPeriod, 16}));
+}
+
+std::vector<int> steps_of(const LearnOptions& options, int width, int height) {
+  return Learner::make(options, width, height)->sample_steps();
 }
 
 // The step that robust chooses leaves room for one that is twice as coarse.
-TEST(FrontOfEfforts, HasACoarserStepThanTheDefault) {
+TEST(SampleSteps, HaveACoarserOneThanTheDefault) {
   for (const auto& [width, height] :
        {std::pair{320, 240}, {768, 576}, {1280, 720}, {1920, 1080}, {640, 480}}) {
-    const int step = RobustSolver::chosen_step(width, height);
-    EXPECT_EQ(front_of_efforts({1, 1, step}, true, width, height)[1], (Effort{1, 1, 2 * step}))
-        << width << "x" << height;
+    const std::vector<int> steps = steps_of({}, width, height);
+    ASSERT_GE(steps.size(), 2u) << width << "x" << height;
+    EXPECT_EQ(steps[0], layout_of({}, width, height).sample_step);
+    EXPECT_EQ(steps[1], 2 * steps[0]);
   }
 }
 
-TEST(FrontOfEfforts, KeepsSamplesOfSmallPicturesAndOfPlainMethods) {
-  EXPECT_EQ(front_of_efforts({1, 1, 1}, true, 40, 40)[1], (Effort{2, 1, 1}));
-  EXPECT_EQ(front_of_efforts({1, 1, 1}, true, 1, 1)[1], (Effort{2, 1, 1}));
-  EXPECT_EQ(front_of_efforts({1, 1, 1}, false, 640, 480)[1], (Effort{2, 1, 1}));
+TEST(SampleSteps, AreOneForSmallPicturesAndPlainMethods) {
+  LearnOptions options;
+  options.sample_step = 1;
+  EXPECT_EQ(steps_of(options, 40, 40), std::vector<int>{1});
+  EXPECT_EQ(steps_of(options, 1, 1), std::vector<int>{1});
+  for (Method method : {Method::qdmd, Method::dmd}) {
+    options.method = method;
+    EXPECT_EQ(steps_of(options, 640, 480), std::vector<int>{1});
+  }
 }
 
 TEST(TimeBudget, WithoutOneEveryStretchHasTheBest) {
@@ -88,31 +96,72 @@ TEST(TimeBudget, WithoutOneEveryStretchHasTheBest) {
   machine.run(50);
   EXPECT_EQ(machine.solves, 50);
   EXPECT_EQ(machine.budget.effort(), kFront[0]);
-  EXPECT_NEAR(machine.budget.predicted(), 0.016, 1e-12);
-  // 0.08 + 0.02 / 16 for each solve of one iteration at step 8.
-  EXPECT_NEAR(machine.budget.predicted({2, 1, 8}), 0.001 + 0.08125 / 20, 1e-12);
+  EXPECT_NEAR(machine.budget.predicted(), 0.011, 1e-12);
+  // 0.08 + 0.02 / 16 for each solve at step 8.
+  EXPECT_NEAR(machine.budget.predicted({2, 8}), 0.001 + 0.08125 / 20, 1e-12);
 }
 
-// A solve takes 0.015 a frame of its stretch, 0.01, 0.0085, 0.0081 or 0.008; 0.001 are not to be
-// had back.
+// A solve takes 0.01 a frame of its stretch, 0.0085, 0.0081 or 0.008; 0.001 are not to be had back.
 TEST(TimeBudget, TakesTheBestThatFits) {
-  for (const auto& [allowed, chosen] : {std::pair{0.02, Effort{1, 2, 2}},
-                                        {0.0165, Effort{1, 2, 2}},
-                                        {0.0155, Effort{1, 1, 2}},
-                                        {0.0108, Effort{1, 1, 4}},
-                                        {0.0093, Effort{1, 1, 8}},
-                                        {0.0053, Effort{2, 1, 16}},
-                                        {0.0048, Effort{3, 1, 16}},
-                                        {0.0018, Effort{12, 1, 16}},
-                                        {0.0005, Effort{16, 1, 16}}}) {
+  for (const auto& [allowed, chosen] : {std::pair{0.02, Effort{1, 2}},
+                                        {0.0165, Effort{1, 2}},
+                                        {0.0155, Effort{1, 2}},
+                                        {0.0108, Effort{1, 4}},
+                                        {0.0093, Effort{1, 8}},
+                                        {0.0053, Effort{2, 16}},
+                                        {0.0048, Effort{3, 16}},
+                                        {0.0018, Effort{12, 16}},
+                                        {0.0005, Effort{16, 16}}}) {
     Machine machine(allowed);
     machine.run(400);
     EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
+    // What the first stretches took too much is paid back to the last second.
     if (allowed > 0.0016) {
-      EXPECT_LE(machine.seconds / (10 * machine.stretches), 1.01 * allowed) << allowed;
+      EXPECT_LE(machine.seconds / (10 * machine.stretches), allowed) << allowed;
     }
-    EXPECT_NEAR(machine.solves, 400.0 / chosen.period, 3);
+    // Before the first stretch nobody knows what a solve takes, and after it some wait.
+    EXPECT_NEAR(machine.solves, 400.0 / chosen.period, 1);
     EXPECT_LE(machine.oldest_age, TimeBudget::kMostPeriod);
+  }
+}
+
+// Sums of up to 640 stretches, whose times the model has met 160 times before: 0.75^160 of its
+// first guess is left.
+double rounding_of(double predicted) { return 640 * kEpsilon * predicted; }
+
+TEST(TimeBudget, ThePredictionComesTrue) {
+  for (const auto& [allowed, chosen] : {std::pair{0.0, kFront[0]},
+                                        {0.0165, kFront[0]},
+                                        {0.0155, kFront[0]},
+                                        {0.0108, kFront[1]},
+                                        {0.0093, kFront[2]},
+                                        {0.0053, kFront[4]},
+                                        {0.0048, kFront[5]},
+                                        {0.0018, kFront[9]},
+                                        {0.0005, kFront[10]}}) {
+    Machine machine(allowed);
+    machine.run(160);
+    EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
+    // Whole periods of any effort.
+    const double measured = machine.mean_of(480), predicted = machine.budget.predicted();
+    EXPECT_NEAR(measured, predicted, rounding_of(predicted)) << allowed;
+    if (allowed > 0.0016) {
+      EXPECT_LE(predicted, allowed);
+    }
+  }
+}
+
+// What one effort took says what others take, once it is known what a frame takes without a solve.
+TEST(TimeBudget, TheModelForetellsOtherEfforts) {
+  for (const double allowed : {0.0, 0.0093, 0.0048}) {
+    Machine machine(allowed);
+    machine.run(160);
+    for (const Effort& other : kFront) {
+      Machine fixed(0, {other});
+      fixed.run(160);
+      const double measured = fixed.mean_of(480);
+      EXPECT_NEAR(machine.budget.predicted(other), measured, rounding_of(measured)) << allowed;
+    }
   }
 }
 
@@ -135,7 +184,7 @@ TEST(TimeBudget, TheFirstStretchIsPaidBack) {
   machine.run(1);
   EXPECT_GT(machine.seconds / 10, 2 * 0.004);
   machine.run(19);
-  EXPECT_LE(machine.seconds / 200, 1.05 * 0.004);
+  EXPECT_LE(machine.seconds / 200, 0.004);
 }
 
 // Measurements that waver by a tenth: the choice changes at the beginning, then hardly ever.
@@ -157,12 +206,12 @@ TEST(TimeBudget, DoesNotFlap) {
 TEST(TimeBudget, ALoadIsKnownAfterTwoStretches) {
   Machine machine(0.0055);
   machine.run(50);
-  EXPECT_EQ(machine.budget.effort(), (Effort{2, 1, 16}));
+  EXPECT_EQ(machine.budget.effort(), (Effort{2, 16}));
   // Everything takes twice as long: 0.002 + 0.016 / p must not exceed 0.0055.
   machine.slow_down(2);
   machine.run(2);
   EXPECT_GE(machine.budget.effort().period, 4);
-  EXPECT_LE(machine.mean_of(40), 1.05 * 0.0055);
+  EXPECT_LE(machine.mean_of(40), 0.0055);
   EXPECT_NEAR(machine.budget.effort().period, 5, 1);
   machine.slow_down(0.5);
   machine.run(20);
@@ -207,7 +256,7 @@ TEST(TimeBudget, ABreakIsFollowedByASolveAndSpoilsNothing) {
   machine.run(20);
   const double predicted = machine.budget.predicted();
   machine.budget.next();
-  machine.budget.add(1, 0.1, {0.1, 0, 0});
+  machine.budget.add(1, 0.1, {0.1, 0});
   EXPECT_EQ(machine.budget.predicted(), predicted);
   machine.budget.solve_next();
   EXPECT_TRUE(machine.budget.next());
@@ -217,7 +266,7 @@ TEST(TimeBudget, AnotherOneTakesEffectAtOnce) {
   Machine machine(0.0055);
   machine.run(10);
   machine.budget.set(0.0018);
-  EXPECT_EQ(machine.budget.effort(), (Effort{12, 1, 16}));
+  EXPECT_EQ(machine.budget.effort(), (Effort{12, 16}));
   machine.budget.set(0);
   const int before = machine.solves;
   machine.run(10);
@@ -230,31 +279,34 @@ TEST(TimeBudget, StretchesOfOtherLengthsAreOfTheSameSolve) {
   budget.begin(kFront, 10);
   for (int frames : {1, 2, 4, 8, 10}) {
     EXPECT_TRUE(budget.next());
-    budget.add(frames, 0.001 * frames + 0.1, {0.1, 0, 0});
+    budget.add(frames, 0.001 * frames + 0.1, {0.1, 0});
   }
   EXPECT_NEAR(budget.predicted(kFront[0]), 0.001 + 0.01, 1e-12);
 }
 
 // ---- In the engine ----
 
-// Frames of real work: the cost model against the clock. Times are those of this machine at this
-// moment, so they are compared with each other only.
+// Seconds that a frame takes beside the engine, which is told of them: a clock of the test's own.
+// What the engine itself takes does not show beside them, however slow the machine is.
+constexpr double kBeside = 1e6, kBesideEngine = 1e-3 * kBeside;
+
+// Frames of real work.
 class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
  protected:
   static constexpr int kSide = 128, kFrames = 240;
 
   struct Outcome {
     uint64_t solves = 0;
-    double predicted = 0, measured = 0;  // seconds a frame; the latter of the second half
-    Effort effort;
     TimeBudget model;
+    std::vector<SolveReport> reports;  // of each solve
+    double seconds = 0;                // in all of push() and pop()
+    Clock::Spent spent;
     std::vector<std::vector<uint8_t>> pictures;
   };
-  // seconds: allowed for each frame; 0: no limit.
-  static Outcome run(double seconds, int iterations = 1, int sample_step = 0) {
+  // allowed: seconds for each frame; 0: no limit.
+  static Outcome run(double allowed, int iterations = 1, int count = kFrames) {
     EngineOptions options;
     options.iterations = iterations;
-    options.sample_step = sample_step;
     options.mode = std::get<0>(GetParam());
     options.method = std::get<1>(GetParam());
     options.window_size = 20;
@@ -262,7 +314,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     options.threads = 1;
     Engine engine;
     EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
-    engine.set_time_budget(seconds);
+    engine.set_time_budget(allowed);
     std::mt19937 rng(7);
     std::vector<Picture> frames;
     for (int k = 0; k < 12; ++k) {
@@ -273,8 +325,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     }
     Outcome outcome;
     Picture out(kSide, kSide);
-    double total = 0;
-    for (int t = 0; t < kFrames; ++t) {
+    for (int t = 0; t < count; ++t) {
       const auto start = std::chrono::steady_clock::now();
       EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in()).ok());
       int ready = 0;
@@ -282,68 +333,69 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
         engine.pop(Output::background, out.out());
         outcome.pictures.push_back({});
       }
-      if (t >= kFrames / 2)
-        total += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      outcome.seconds +=
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      engine.clock().charge(Clock::frames, kBeside);
       if (ready > 0) outcome.pictures.back() = out.planes();
+      if (engine.solves() > outcome.reports.size()) outcome.reports.push_back(engine.report());
     }
-    outcome.measured = total / (kFrames - kFrames / 2);
     outcome.solves = engine.solves();
-    outcome.predicted = engine.time_budget().predicted();
-    outcome.effort = engine.time_budget().effort();
     outcome.model = engine.time_budget();
+    outcome.spent = engine.clock().spent();
     return outcome;
   }
 };
 
-TEST_P(BudgetOfEngine, ThePredictionComesTrueWithinHalfAsMuch) {
-  // The machine may be disturbed: one of three tries must do.
-  double worst = 0;
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    const Outcome free = run(0);
-    const Outcome limited = run(0.6 * free.measured);
-    EXPECT_EQ(free.pictures.size(), static_cast<size_t>(kFrames));
-    EXPECT_EQ(limited.pictures.size(), static_cast<size_t>(kFrames)) << "no frame is lost";
-    EXPECT_EQ(free.effort.period, 1);
-    worst = 0;
-    for (const Outcome& outcome : {free, limited})
-      worst = std::max(
-          {worst, outcome.predicted / outcome.measured, outcome.measured / outcome.predicted});
-    if (worst < 1.5 && limited.effort != free.effort && limited.measured < free.measured) return;
-  }
-  FAIL() << "off by a factor of " << worst;
+TEST_P(BudgetOfEngine, WhatFramesTakeBesideTheEngineCounts) {
+  const TimeBudget model = run(0).model;
+  EXPECT_NEAR(model.predicted(), kBeside, kBesideEngine);
+  EXPECT_EQ(model.effort().period, 1);
+  // A frame takes it with a solve and without.
+  EXPECT_NEAR(model.predicted({TimeBudget::kMostPeriod, 1}), kBeside, kBesideEngine);
+}
+
+// So little that a single frame forbids the next solves.
+TEST_P(BudgetOfEngine, WhereNothingFitsSolvesAreRareAndNoFrameIsLost) {
+  // In live mode a solve says what solves take only when the window is full.
+  constexpr int kCount = 360;
+  const Outcome free = run(0, 1, kCount), limited = run(1e-3 * kBeside, 1, kCount);
+  EXPECT_EQ(free.pictures.size(), static_cast<size_t>(kCount));
+  EXPECT_EQ(limited.pictures.size(), static_cast<size_t>(kCount)) << "no frame is lost";
+  EXPECT_EQ(limited.model.effort().period, TimeBudget::kMostPeriod);
+  EXPECT_EQ(limited.solves, 1 + (free.solves - 1) / TimeBudget::kMostPeriod);
 }
 
 TEST_P(BudgetOfEngine, WithRoomForEverythingNothingChanges) {
-  const Outcome free = run(0), wide = run(3600);
+  const Outcome free = run(0), wide = run(2 * kBeside);
+  EXPECT_EQ(wide.model.effort().period, 1);
   EXPECT_EQ(free.solves, wide.solves);
   EXPECT_EQ(free.pictures, wide.pictures);
 }
 
-class BudgetOfRobust : public BudgetOfEngine {};
-
-// What one effort took says what others take.
-TEST_P(BudgetOfRobust, TheModelForetellsOtherEfforts) {
-  double worst = 0;
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    const TimeBudget model = run(0, 3, 1).model;
-    worst = 0;
-    for (const Effort& other : {Effort{1, 1, 1}, Effort{1, 3, 4}, Effort{1, 1, 4}}) {
-      const double predicted = model.predicted(other);
-      const double measured = run(0, other.iterations, other.sample_step).measured;
-      worst = std::max({worst, predicted / measured, measured / predicted});
+// On one thread they lie within push() and pop(), one after another, on the same clock.
+TEST_P(BudgetOfEngine, PartsOfACostAreNoMoreThanTheWhole) {
+  const bool robust = std::get<1>(GetParam()) == Method::robust;
+  for (int iterations : {1, 3}) {
+    const Outcome outcome = run(0, iterations);
+    EXPECT_EQ(outcome.reports.size(), outcome.solves);
+    double sum = 0;
+    for (const SolveReport& report : outcome.reports) {
+      EXPECT_GT(report.solve_time, 0);
+      sum += report.solve_time;
     }
-    if (worst < 1.5) return;
+    const Clock::Spent& spent = outcome.spent;
+    EXPECT_GT(spent.of(Clock::solving), 0);
+    // Each method has one of them.
+    EXPECT_EQ(spent.of(Clock::samples) > 0, robust);
+    EXPECT_EQ(spent.of(Clock::products) > 0, !robust);
+    EXPECT_LE(sum, spent.of_solves() + rounding_of(spent.of_solves()));
+    EXPECT_LE(spent.all() - kFrames * kBeside, outcome.seconds + rounding_of(spent.all()));
   }
-  FAIL() << "off by a factor of " << worst;
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfEngine,
                          testing::Combine(testing::Values(Mode::batch, Mode::live),
                                           testing::Values(Method::robust, Method::qdmd)));
-
-INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfRobust,
-                         testing::Combine(testing::Values(Mode::batch, Mode::live),
-                                          testing::Values(Method::robust)));
 
 // An engine for pictures of a scene that changes in nothing but its light.
 struct Separator {
@@ -385,10 +437,11 @@ TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
     for (int t = 0; t < 100; ++t) {
       separator.push(1);
       separator.pop(1);
+      separator.engine.clock().charge(Clock::frames, kBeside);
     }
     const TimeBudget& model = separator.engine.time_budget();
-    EXPECT_GT(model.predicted({TimeBudget::kMostPeriod, 1, 1}),
-              1.01 * model.predicted({1, 1, 1}) / TimeBudget::kMostPeriod);
+    for (const Effort& effort : {Effort{1, 1}, Effort{TimeBudget::kMostPeriod, 1, 1}})
+      EXPECT_NEAR(model.predicted(effort), kBeside, kBesideEngine);
   }
 }
 
@@ -409,7 +462,7 @@ TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
   }
 }
 
-// Whoever lets go of a frozen background has another one at once, in the light that there is.
+// Who lets go of a frozen background has another one at once, in the light that there is.
 TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
   constexpr int kWindow = 10;
   Separator separator(Mode::batch, kWindow);

@@ -4,11 +4,9 @@
 #include <cstdio>
 #include <functional>
 
-#include "core/passes/combine.h"
-#include "core/engine/engine_options.h"
-#include "core/passes/planes.h"
-#include "core/learn/robust/robust_solver.h"
+#include "core/learn/robust/robust_learner.h"
 #include "core/metrics/picture_scores.h"
+#include "core/passes/combine.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"
 
@@ -19,7 +17,7 @@ using namespace qdmd::evaluation;
 
 struct Setting {
   RobustParameters parameters;
-  int iterations = EngineOptions().iterations, rank = 0, window = 300;
+  int iterations = LearnOptions().iterations, rank = 0, window = 300;
   int step = 0;  // 0: chosen
 };
 
@@ -82,29 +80,26 @@ cv::Mat middle_of(BackgroundModel* model, int frames, cv::Size size) {
 Outcome measure(const Clip& clip, const Setting& setting, Pool* pool) {
   const cv::Size size = clip.frames[0].size();
   const auto truth = luma(view_of(clip.truth));
-  DmdOptions options;
-  options.method = Method::robust;
-  options.rank = setting.rank;
-  const int step =
-      setting.step > 0 ? setting.step : RobustSolver::chosen_step(size.width, size.height);
+  LearnOptions options;
+  options.dmd.rank = setting.rank;
+  options.iterations = setting.iterations;
+  options.sample_step = setting.step;
   const int count = static_cast<int>(clip.frames.size());
   const int capacity = std::min(count, setting.window), windows = count / capacity;
   Outcome outcome;
-  RobustSolver solver(options, setting.iterations, step, capacity, size.width, size.height, pool,
-                      setting.parameters);
+  Clock clock;
+  RobustLearner learner(options, size.width, size.height, setting.parameters);
+  FrameStore frames(capacity, size.width, size.height, learner.contents());
+  learner.begin({&frames, capacity, false, pool, &clock});
   for (int w = 0; w < windows; ++w) {
-    Window window(capacity, static_cast<size_t>(size.area()));
     const auto start = std::chrono::steady_clock::now();
-    for (int t = 0; t < capacity; ++t) {
-      const int slot = window.append();
-      uint8_t* const planes[3] = {window.plane(slot, 0), window.plane(slot, 1),
-                                  window.plane(slot, 2)};
-      split_channels(view_of(clip.frames[static_cast<size_t>(w * capacity + t)]), 0, size.height, 0,
-                     planes);
-      solver.append(window, slot);
-    }
+    frames.clear();
+    for (int t = 0; t < capacity; ++t)
+      frames.append(view_of(clip.frames[static_cast<size_t>(w * capacity + t)]));
     BackgroundModel model;
-    solver.solve(window, 1, &model);
+    learner.decompose(frames.window());
+    learner.build({}, &model);
+    learner.publish();
     outcome.seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const cv::Mat picture = middle_of(&model, capacity, size);

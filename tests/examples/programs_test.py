@@ -97,12 +97,19 @@ def watch_errors(folder):
 def record_motion(folder):
     recorder = subprocess.Popen([examples / 'record.py', '--output', 'motion.mkv'], cwd=folder,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(8)
+    # Some hundred frames of 40 kB. A minute is for a recorder that hangs.
+    film = folder / 'motion.mkv'
+    hung = time.monotonic() + 60
+    while not film.exists() or film.stat().st_size < 4_000_000:
+        if recorder.poll() is not None or time.monotonic() > hung:
+            recorder.kill()
+            raise AssertionError('nothing is recorded: ' + ''.join(recorder.communicate()))
+        time.sleep(0.05)
     recorder.send_signal(signal.SIGINT)
     said, errors = recorder.communicate(timeout=60)
     assert recorder.returncode == 0, said + errors
     assert 'recording' in said, said
-    frames = common.count_frames(folder / 'motion.mkv')
+    frames = common.count_frames(film)
     assert frames > 50, f'{frames} frames\n{said}'
 
 
@@ -138,7 +145,7 @@ def messages_as_documented(folder):
     names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double'}
     try:
         for _ in range(3):
-            message = pipeline.get_bus().timed_pop_filtered(10 * common.Gst.SECOND,
+            message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,
                                                             common.Gst.MessageType.ELEMENT)
             assert message, 'no message came'
             fields = message.get_structure()

@@ -90,7 +90,7 @@ TEST(LiveLatency, OfALiveSourceIsAddedToNothing) {
               " ! qdmdbackground mode=live ! fakesink sync=true",
         nullptr);
     gst_element_set_state(pipeline, GST_STATE_PLAYING);
-    gst_element_get_state(pipeline, nullptr, nullptr, 10 * GST_SECOND);
+    gst_element_get_state(pipeline, nullptr, nullptr, 60 * GST_SECOND);
     queries[k] = gst_query_new_latency();
     EXPECT_TRUE(gst_element_query(pipeline, queries[k]));
     gboolean live = FALSE;

@@ -76,7 +76,7 @@ class Pipeline {
   GstElement* get() { return pipeline_; }
   bool pause() {
     gst_element_set_state(pipeline_, GST_STATE_PAUSED);
-    return gst_element_get_state(pipeline_, nullptr, nullptr, 20 * GST_SECOND) ==
+    return gst_element_get_state(pipeline_, nullptr, nullptr, 60 * GST_SECOND) ==
            GST_STATE_CHANGE_SUCCESS;
   }
   // Plays to the end; the text of an error, or nothing.
@@ -213,7 +213,7 @@ TEST(SceneSource, SeekingGivesTheFrameThatPlayingGives) {
     ASSERT_TRUE(gst_element_seek_simple(pipeline.get(), GST_FORMAT_TIME,
                                         GstSeekFlags(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
                                         gint64(position)));
-    ASSERT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 20 * GST_SECOND),
+    ASSERT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
               GST_STATE_CHANGE_SUCCESS);
     ASSERT_FALSE(pipeline.preroll.empty());
     EXPECT_EQ(pipeline.preroll.back().pts, played[static_cast<size_t>(k)].pts);

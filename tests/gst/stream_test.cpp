@@ -43,7 +43,7 @@ TEST(Downstream, MayEndInTheMiddleOfAWindow) {
     gst_element_set_state(pipeline, GST_STATE_PLAYING);
     GstBus* bus = gst_element_get_bus(pipeline);
     GstMessage* message = gst_bus_timed_pop_filtered(
-        bus, 30 * GST_SECOND, GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+        bus, 60 * GST_SECOND, GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
     ASSERT_TRUE(message) << "it did not end";
     EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(message));
     gst_message_unref(message);

@@ -71,8 +71,8 @@ if [ "${QDMD_TEST_INSTALL:-0}" = 1 ] && [ "$(id -u)" -eq 0 ] &&
   "${apt[@]}" install --no-install-recommends "$plugin" "$scene"
   status=0
   "$tests/try_plugin.sh" "/$folder" || status=$?
-  env -u GST_PLUGIN_PATH -u GST_PLUGIN_PATH_1_0 GST_REGISTRY_1_0="$work/registry.bin" \
-    gst-inspect-1.0 qdmdbackground >/dev/null || status=$?
+  env -u GST_PLUGIN_PATH -u GST_PLUGIN_PATH_1_0 -u GST_PLUGIN_SYSTEM_PATH_1_0 \
+    GST_REGISTRY_1_0="$work/registry.bin" gst-inspect-1.0 qdmdbackground >/dev/null || status=$?
   "${apt[@]}" purge gstreamer1.0-qdmd gstreamer1.0-qdmd-scene
   diff /dev/null <(find "/$folder" -name 'libgstqdmd*')
   exit "$status"
