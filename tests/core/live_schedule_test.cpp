@@ -1,5 +1,5 @@
 // A solve whose work is spread over many frames: the same bits, later.
-#include "core/engine/live_solver.h"
+#include "core/engine/live_schedule.h"
 
 #include <optional>
 
