@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, checks the formatting and runs every test.
+# Installs what is missing, builds, checks the formatting and runs every test, and the short form of
+# the sanitizers.
 #
 #   QDMD_TEST_PACKAGE=1   compiles the Debian packages from their source, too: minutes more
 #   QDMD_TEST_INSTALL=1   as root: installs the packages on this machine and removes them again
@@ -47,6 +48,9 @@ meson test -C build --no-rebuild --print-errorlogs || status=$?
 read -r passed failed skipped <<<"$(count_results build)"
 # A program that dies without a report of its own is a failure too.
 [ "$status" -eq 0 ] || [ "$failed" -gt 0 ] || failed=1
+
+echo "== sanitizers"
+if tests/sanitize.sh; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
 if [ "$formatted" = yes ]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
 
 echo "$passed passed, $failed failed, $skipped skipped"

@@ -1,31 +1,78 @@
 #!/usr/bin/env bash
-# Builds the element with a sanitizer, in a folder of its own, and runs the tests in which threads
-# meet: many minutes of compiling.
+# Runs tests with the compiler's sanitizers, in folders of their own.
 #
-#   tests/sanitize.sh [thread|address|undefined]     default: thread
+#   tests/sanitize.sh                     the short form, a minute with its compiling: kernels with
+#                                         address and undefined, threads with thread
+#   tests/sanitize.sh --long [KIND...]    the tests in which threads meet, those of the kernels, and
+#                                         of the element: many minutes of compiling for each
+#                                         KIND: thread, address,undefined (default: both)
 set -euo pipefail
 cd "$(dirname "$0")/.."
-kind=${1:-thread}
-build=build-$kind
-
-tests/install-dependencies.sh build test
-again=()
-[ ! -f "$build/build.ninja" ] || again=(--reconfigure)
-meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
-  -Dtests=enabled -Dscene=disabled
-targets=(gst/libgstqdmd.so)
-for name in pool side_thread; do targets+=("tests/core/${name}_test"); done
-for name in features live; do targets+=("tests/gst/element-$name-test"); done
-ninja -C "$build" "${targets[@]}"
 
 export TSAN_OPTIONS="halt_on_error=1 suppressions=$PWD/tests/gst/tsan.supp ${TSAN_OPTIONS:-}"
 # What a test of leaks finds in libraries is not ours.
 export ASAN_OPTIONS="detect_leaks=0 ${ASAN_OPTIONS:-}"
-export GST_PLUGIN_PATH_1_0="$PWD/$build/gst" GST_REGISTRY_1_0="$PWD/$build/registry.bin"
-# No other plugins: some do odd things when they are looked at.
-export GST_REGISTRY_FORK=no GST_PLUGIN_SYSTEM_PATH_1_0=
-for target in "${targets[@]:1}"; do
-  echo "== $target"
-  "$build/$target" --gtest_filter='PropertyStorm*:Threads*:*OtherThreads*:Pool*:SideThread*:Freeze*:Reset*' \
-    --gtest_brief=1
-done
+export UBSAN_OPTIONS="print_stacktrace=1 halt_on_error=1 ${UBSAN_OPTIONS:-}"
+
+# The few files that the tests below need: all of the core takes minutes, because of Eigen.
+short() {
+  local kind=$1 name=$2 folder=build-sanitize/$2 file
+  shift 2
+  mkdir -p "$folder"
+  echo "== $name: $kind"
+  for file in "$@"; do
+    echo "$file" "$folder/${file//\//_}.o"
+  done | xargs -P "$(nproc)" -L 1 bash -c \
+    '${CXX:-c++} $0 -c "$1" -o "$2"' "$flags -fsanitize=$kind -fno-sanitize-recover=all"
+  # shellcheck disable=SC2046,SC2086
+  ${CXX:-c++} -fsanitize="$kind" "$folder"/*.o -o "$folder/$name" \
+    $(pkg-config --libs gtest_main libhwy) -pthread
+  # One part for each core.
+  seq 0 $(($(nproc) - 1)) | GTEST_TOTAL_SHARDS=$(nproc) xargs -P "$(nproc)" -I{} \
+    env GTEST_SHARD_INDEX={} "$folder/$name" --gtest_brief=1 --gtest_filter="-$slow"
+}
+
+long() {
+  local kind=$1 build=build-$1 again=() targets=() names=()
+  [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
+  meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
+    -Dtests=enabled -Dscene=disabled -Dwerror=false
+  case "$kind" in
+    thread) names=(pool side_thread gram_slices live_schedule) ;;
+    *) names=(kernel passes combine gram gram_slices robust_fill robust_parts pool side_thread) ;;
+  esac
+  for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done
+  for name in features live; do targets+=("tests/gst/element-$name-test"); done
+  ninja -C "$build" gst/libgstqdmd.so "${targets[@]}"
+  export GST_PLUGIN_PATH_1_0="$PWD/$build/gst" GST_REGISTRY_1_0="$PWD/$build/registry.bin"
+  # No other plugins: some do odd things when they are looked at.
+  export GST_REGISTRY_FORK=no GST_PLUGIN_SYSTEM_PATH_1_0=
+  for target in "${targets[@]}"; do
+    echo "== $target: $kind"
+    case "$target" in
+      # The rest of them needs plugins, or takes long.
+      *element*) set -- --gtest_filter='PropertyStorm*:Threads*:*OtherThreads*:Freeze*:Reset*' ;;
+      *) set -- ;;
+    esac
+    "$build/$target" --gtest_brief=1 "$@"
+  done
+}
+
+tests/install-dependencies.sh build test
+if [ "${1:-}" = --long ]; then
+  shift
+  [ "$#" -gt 0 ] || set -- thread address,undefined
+  for kind in "$@"; do long "$kind"; done
+  exit
+elif [ "$#" -gt 0 ]; then
+  sed -n '2,/^set/s/^# \?//p' "$0" >&2
+  exit 2
+fi
+
+# Half of the time, for no other kernel.
+slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
+flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
+short thread threads core/parallel/{pool,side_thread}.cpp tests/core/{pool,side_thread}_test.cpp
+short address,undefined kernels core/gram/{tile_kernel,kernel,gram,window}.cpp \
+  core/passes/{combine,planes,residual}.cpp core/parallel/pool.cpp \
+  tests/core/{gram,kernel,passes,combine}_test.cpp

@@ -167,6 +167,16 @@ void add_scaling(bool brief, int turns, double seconds, Table* table, Steps* ste
                       }});
   };
 
+  for (Method method : {Method::robust, Method::qdmd}) {
+    const std::string name = method == Method::robust ? "robust" : "qdmd";
+    add(name + ", pixels", [=](Sweep* sweep) {
+      for (const Size& size : sizes) add_engine(sweep, method, fixed_window, size);
+    });
+    add(name + ", window", [=](Sweep* sweep) {
+      for (int window : windows({25, 50, 100, 200, 300}))
+        add_engine(sweep, method, window, {320, 240});
+    });
+  }
   add("Gram matrix, pixels", [=](Sweep* sweep) {
     for (const Size& size : sizes) add_gram(sweep, fixed_window, size);
   });
@@ -185,16 +195,6 @@ void add_scaling(bool brief, int turns, double seconds, Table* table, Steps* ste
       if (window <= 200) add_solve(sweep, problem, kTiny, Solver::qr, 0);
     }
   });
-  for (Method method : {Method::robust, Method::qdmd}) {
-    const std::string name = method == Method::robust ? "robust" : "qdmd";
-    add(name + ", pixels", [=](Sweep* sweep) {
-      for (const Size& size : sizes) add_engine(sweep, method, fixed_window, size);
-    });
-    add(name + ", window", [=](Sweep* sweep) {
-      for (int window : windows({25, 50, 100, 200, 300}))
-        add_engine(sweep, method, window, {320, 240});
-    });
-  }
 }
 
 }  // namespace qdmd::bench

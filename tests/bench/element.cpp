@@ -219,11 +219,12 @@ std::vector<std::unique_ptr<Peer>> peers_of(const Frames& frames) {
   };
   element("identity", "identity", 1, 2);
   element("robust", robust + std::to_string(window), window, window);
+  const std::string live =
+      std::to_string(kLiveWindow) + " mode=live hop-size=" + std::to_string(kLiveHop);
+  element("robust_live", robust + live, kLiveHop, kLiveWindow + kLiveHop);
   element("qdmd", qdmd + std::to_string(window), window, window);
   element("qdmd_rank_1", qdmd + std::to_string(window) + " rank=1", window, window);
-  element("qdmd_live",
-          qdmd + std::to_string(kLiveWindow) + " mode=live hop-size=" + std::to_string(kLiveHop),
-          kLiveHop, kLiveWindow + kLiveHop);
+  element("qdmd_live", qdmd + live, kLiveHop, kLiveWindow + kLiveHop);
   element("segmentation", "segmentation method=mog2 test-mode=true", 1,
           std::min<size_t>(window, 30));
   subtractor("mog2", cv::createBackgroundSubtractorMOG2());

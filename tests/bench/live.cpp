@@ -23,7 +23,7 @@ using namespace qdmd::bench;
 struct Options {
   int width = 1920, height = 1080, rate = 25, window = 100, hop = 25, threads = 0;
   double seconds = 60;
-  std::string mode = "live", method = "qdmd", output = "mask", extra;
+  std::string mode = "live", method = "robust", output = "mask", extra;
   bool unpaced = false, brief = false;
 };
 
@@ -278,7 +278,9 @@ int main(int argc, char** argv) {
   app.add_option("--window-size", options.window, "window-size")->capture_default_str();
   app.add_option("--hop-size", options.hop, "hop-size, in live mode")->capture_default_str();
   app.add_option("--n-threads", options.threads, "n-threads")->capture_default_str();
-  app.add_option("--method", options.method)->check(CLI::IsMember({"robust", "qdmd", "dmd"}));
+  app.add_option("--method", options.method, "method")
+      ->check(CLI::IsMember({"robust", "qdmd", "dmd"}))
+      ->capture_default_str();
   app.add_option("--properties", options.extra, "more properties, as in gst-launch-1.0");
   app.add_flag("--unpaced", options.unpaced, "frames as fast as they are taken");
   app.add_flag("--short", options.brief, "3 seconds of 320x240");

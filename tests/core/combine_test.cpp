@@ -1,12 +1,17 @@
 // Combinations of planes and of pictures against sums in more digits, on every instruction set.
 #include "core/passes/combine.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <random>
+#include <string>
+#include <vector>
 
+#include "tests/core/constants.h"
 #include "tests/core/simd_targets.h"
-#include "tests/core/test_util.h"
 
 namespace qdmd::test {
 namespace {

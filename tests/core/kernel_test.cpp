@@ -1,11 +1,17 @@
 // Every kernel against integers of any size.
 #include "core/gram/kernel.h"
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cstring>
 #include <numeric>
+#include <random>
+#include <string>
+#include <vector>
 
-#include "tests/core/test_util.h"
+#include "core/gram/window.h"
 
 namespace qdmd::test {
 namespace {

@@ -1,13 +1,17 @@
 // The passes over pixels against their definitions, on every instruction set of this machine.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "core/passes/combine.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
+#include "tests/core/constants.h"
 #include "tests/core/simd_targets.h"
-#include "tests/core/test_util.h"
 
 namespace qdmd::test {
 namespace {

@@ -1,4 +1,6 @@
 // The engine with method=robust: windows without foreground, with much of it, and changing light.
+#include <tuple>
+
 #include "tests/core/robust_util.h"
 #include "tests/stability/hard_cases.h"
 
@@ -60,7 +62,8 @@ Clip walking_clip(size_t count, double sigma = 2) {
   return clip;
 }
 
-std::vector<std::vector<uint8_t>> backgrounds_of(const Clip& clip, int iterations = 2) {
+std::vector<std::vector<uint8_t>> backgrounds_of(const Clip& clip,
+                                                 int iterations = EngineOptions().iterations) {
   return run_engine(clip, kWidth, kHeight, robust_of(static_cast<int>(clip.size()), iterations));
 }
 
@@ -421,17 +424,35 @@ TEST(RobustEngine, HardCasesPass) {
     const std::vector<int> heights = hard.large ? std::vector{2160} : std::vector{1, 4};
     for (int height : heights) {
       if (pixels % height != 0) continue;
-      for (int rank : {0, 3}) {
-        EngineOptions options = robust_of(std::max(2, window.size()));
+      // The default first, then one thing at a time.
+      for (const auto& [mode, iterations, rank] : {std::tuple{Mode::batch, 1, 0},
+                                                   {Mode::live, 1, 0},
+                                                   {Mode::batch, 2, 0},
+                                                   {Mode::batch, 1, 3},
+                                                   {Mode::batch, 2, 3}}) {
+        // Seconds each.
+        if (hard.large && (mode == Mode::live || iterations > 1)) continue;
+        EngineOptions options = robust_of(std::max(2, window.size()), iterations);
+        options.mode = mode;
         options.dmd.rank = rank;
         Engine engine;
         ASSERT_TRUE(engine.configure(options, pixels / height, height).ok());
+        std::vector<std::vector<uint8_t>> pictures;
+        const auto take = [&] {
+          while (engine.ready()) {
+            Picture picture(pixels / height, height);
+            engine.pop(Output::background, picture.out());
+            pictures.push_back(picture.planes());
+          }
+        };
         for (const auto& frame : clip.frames) {
           Picture picture(pixels / height, height);
           picture.fill(frame);
           ASSERT_TRUE(engine.push(picture.in()).ok());
+          take();
         }
         ASSERT_TRUE(engine.drain().ok());
+        take();
         const SolveReport& report = engine.report();
         EXPECT_TRUE(std::isfinite(report.dmd.lambda.real()));
         EXPECT_TRUE(std::isfinite(report.dmd.lambda.imag()));
@@ -439,17 +460,17 @@ TEST(RobustEngine, HardCasesPass) {
         EXPECT_TRUE(std::isfinite(report.foreground.noise));
         EXPECT_TRUE(std::isfinite(report.foreground.threshold));
         EXPECT_TRUE(report.dmd.converged);
-        std::vector<std::vector<uint8_t>> pictures;
-        while (engine.ready()) {
-          Picture picture(pixels / height, height);
-          engine.pop(Output::background, picture.out());
-          pictures.push_back(picture.planes());
-        }
         EXPECT_EQ(pictures.size(), clip.size());
         // Of a few pixels noise alone makes the mode decay (plain Q-DMD's does, too).
         if (pixels < 16) continue;
+        // A live model is taken beyond its window: one of two frames that differ in their light
+        // goes on with the change.
+        if (mode == Mode::live && (hard.name == "black first frame" || hard.name == "eigenvalue 0"))
+          continue;
         // A background is nowhere outside of what its frames were in, but for a change of light.
-        EXPECT_LE(excursion(pictures, clip), 3) << "height " << height << ", rank " << rank;
+        EXPECT_LE(excursion(pictures, clip), 3)
+            << "height " << height << ", rank " << rank << ", iterations " << iterations
+            << (mode == Mode::live ? ", live" : "");
       }
     }
   }

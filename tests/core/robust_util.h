@@ -18,7 +18,7 @@ inline Grid grid_of(int rows, int cols) {
   return grid;
 }
 
-inline EngineOptions robust_of(int window, int iterations = 2) {
+inline EngineOptions robust_of(int window, int iterations = EngineOptions().iterations) {
   EngineOptions options;
   options.window_size = window;
   options.method = Method::robust;

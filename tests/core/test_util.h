@@ -15,11 +15,9 @@
 #include "core/gram/gram.h"
 #include "core/quaternion/factorize.h"
 #include "tests/core/clips.h"
+#include "tests/core/constants.h"
 
 namespace qdmd::test {
-
-inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // ---- Quaternions ----
 

@@ -440,7 +440,7 @@ TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
       separator.engine.clock().charge(Clock::frames, kBeside);
     }
     const TimeBudget& model = separator.engine.time_budget();
-    for (const Effort& effort : {Effort{1, 1}, Effort{TimeBudget::kMostPeriod, 1, 1}})
+    for (const Effort& effort : {Effort{1, 1}, Effort{TimeBudget::kMostPeriod, 1}})
       EXPECT_NEAR(model.predicted(effort), kBeside, kBesideEngine);
   }
 }
