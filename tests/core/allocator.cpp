@@ -191,7 +191,7 @@ bool allow() {
     take_stack(&stack);
     uint64_t hash = 0;
     // What is above differs with who called the engine.
-    for (int i = 0; i < std::min(stack.depth, 12); ++i)
+    for (int i = 0; i < std::min(stack.depth, 9); ++i)
       hash = (hash ^ reinterpret_cast<uintptr_t>(stack.frame[i])) * 0x100000001B3u;
     places[noted - 1] = hash;
   }

@@ -1,8 +1,9 @@
 // Every allocation of an engine fails once: the caller gets std::bad_alloc or a Status, and the
 // engine can be used again, loses no frame and no memory.
 //
-// Short: of each case the first and the last allocation of each place in the code, and few cases.
-//   QDMD_LONG=1      every allocation of every case: hours
+// Short: few cases, and of their allocations the first of each place in the code.
+//   QDMD_LONG=1      all cases so, and of each method, solver and mode one with every allocation:
+//                    hours
 //   QDMD_SHOW_OOM=1  what was tried, case by case
 #include <array>
 #include <csignal>
@@ -389,8 +390,8 @@ std::optional<int64_t> run(const Trial& trial, const std::vector<std::vector<uin
   return allocations;
 }
 
-// In short: the first allocation of each place in the code that was not tried before.
-void check(const Case& c, std::set<uint64_t>* tried) {
+// Every allocation, or the first of each place in the code that was not tried before.
+void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
   const auto right = [&] {
     Engine engine;
     Owner owner(c, &engine);
@@ -409,7 +410,7 @@ void check(const Case& c, std::set<uint64_t>* tried) {
                   static_cast<long>(*all), numbers.size());
       std::fflush(stdout);
     }
-    if (!kLong) {
+    if (!every) {
       for (int64_t n : numbers) run({c, part, n, n % 3 == 0 ? Failing::all : Failing::one}, right);
     } else {
       for (Failing failing : {Failing::one, Failing::all})
@@ -446,10 +447,14 @@ void check_all(std::initializer_list<Method> methods, std::initializer_list<Solv
                 &tried);
           continue;
         }
-        for (Output output : {Output::background, Output::foreground, Output::mask, Output::cutout})
-          for (int threads : {1, 3})
-            for (Alpha alpha : {Alpha::none, Alpha::constant, Alpha::varying})
-              check({method, solver, mode, output, threads, alpha}, &tried);
+        bool every = true;
+        for (Output output : {Output::foreground, Output::background, Output::mask, Output::cutout})
+          for (int threads : {3, 1})
+            for (Alpha alpha : {Alpha::varying, Alpha::constant, Alpha::none}) {
+              std::set<uint64_t> none;
+              check({method, solver, mode, output, threads, alpha}, &none, every);
+              every = false;
+            }
       }
 }
 

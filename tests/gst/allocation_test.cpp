@@ -15,7 +15,7 @@ void for_frames(const std::string& properties, GstVideoFormat format, int skip, 
                 const std::function<bool(int)>& may_allocate) {
   Stream stream("qdmdbackground " + properties, format, 160, 120);
   std::vector<BufferPtr> frames;
-  for (int t = 0; t < 11; ++t) frames.push_back(stream.make_frame(t, paint_mover));
+  for (int t = 0; t < 11; ++t) frames.push_back(make_bytes(stream.info(), t));
   ASSERT_TRUE(allocator::see_only("libgstqdmd.so"));
   for (int t = 0; t < skip + count; ++t) {
     GstBuffer* buffer = gst_buffer_copy(frames[static_cast<size_t>(t) % frames.size()].get());
