@@ -42,13 +42,10 @@ def who_ended_it(command, limit, timeout):
     frames = [line for line in done.stdout.splitlines() if line.startswith('#')]
     if not frames:
         return '?'
-    below = re.compile(r'raise|abort|pthread_kill|terminate|g_log|g_malloc|g_error|libc\.|libglib|'
-                       r'libstdc|_Unwind|libgcc|^#0')
-    for frame in frames:
-        if below.search(frame):
-            continue
-        return 'ours' if re.search(r'qdmd', frame) else f'other ({frame.split(" in ")[-1][:60]})'
-    return 'other'
+    if any('qdmd' in frame for frame in frames):
+        return 'ours'
+    named = [frame.split(' in ')[-1] for frame in frames if re.search(r' in [a-z]', frame)]
+    return f'other ({named[-1][:60] if named else frames[-1][:60]})'
 
 
 def main():
