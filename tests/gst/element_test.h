@@ -33,6 +33,17 @@ inline void paint_mover(int t, int x, int y, uint8_t rgb[3]) {
 }
 inline void paint_still(int, int x, int y, uint8_t rgb[3]) { paint_mover(-1000, x, y, rgb); }
 
+// A frame of any format: bytes of a still picture, and some that move through it.
+inline BufferPtr make_bytes(const GstVideoInfo& info, int t) {
+  const auto size = static_cast<int>(GST_VIDEO_INFO_SIZE(&info));
+  std::vector<uint8_t> bytes;
+  for (int i = 0; i < size; ++i) bytes.push_back(static_cast<uint8_t>(60 + 7 * i % 83));
+  const int length = size / 12;
+  for (int i = 0; i < length; ++i)
+    bytes[static_cast<size_t>((size / 8 * t + i) % size)] = static_cast<uint8_t>(200 + i % 40);
+  return BufferPtr(gst_buffer_new_memdup(bytes.data(), bytes.size()));
+}
+
 class Stream {
  public:
   // launch: element with its properties; format, size and rate of what is pushed.

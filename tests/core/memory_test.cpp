@@ -1,0 +1,171 @@
+// What an engine promises to take (EngineLayout, max-memory) is what it takes.
+//
+//   QDMD_LONG=1          all cases: minutes
+//   QDMD_SHOW_MEMORY=1   a table of all cases
+//   QDMD_SHOW_SITES=20   of each case the code that holds most bytes when most are held, to
+//   standard
+//                        error; addr2line -fiCe tells names
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "tests/core/allocator.h"
+#include "tests/core/engine_util.h"
+#include "tests/core/solver_names.h"
+
+namespace qdmd::test {
+namespace {
+
+enum class Alpha { none, constant, varying };
+
+struct Case {
+  Method method = Method::robust;
+  Solver solver = Solver::gram;
+  Mode mode = Mode::batch;
+  Alpha alpha = Alpha::none;
+  int width = 320, height = 240, window = 100, threads = 1;
+};
+
+EngineOptions options_of(const Case& c) {
+  EngineOptions options;
+  options.dmd.method = c.method;
+  options.dmd.solver = c.solver;
+  options.mode = c.mode;
+  options.window_size = c.window;
+  options.threads = c.threads;
+  return options;
+}
+
+std::string describe(const Case& c) {
+  const char* const methods[] = {"qdmd", "dmd", "robust"};
+  const char* const alphas[] = {"no alpha", "constant alpha", "varying alpha"};
+  std::string name = methods[static_cast<int>(c.method)];
+  if (c.method == Method::qdmd) name += std::string("/") + name_of(c.solver);
+  return name + (c.mode == Mode::live ? " live " : " batch ") + std::to_string(c.width) + "x" +
+         std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
+         std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)];
+}
+
+// The bytes that an engine for `c` says it takes.
+double promised_bytes(const Case& c) {
+  const EngineLayout layout = layout_of(options_of(c), c.width, c.height);
+  double bytes = static_cast<double>(layout.bytes);
+  if (c.alpha == Alpha::varying) bytes += static_cast<double>(layout.capacity) * c.width * c.height;
+  return bytes;
+}
+
+// A light that goes up and down, and something that moves: all that a solve may need memory for.
+void paint(int t, Alpha alpha, Picture* picture) {
+  for (int y = 0; y < picture->height; ++y)
+    for (int x = 0; x < picture->width; ++x) {
+      const auto p =
+          static_cast<size_t>(y) * static_cast<size_t>(picture->width) + static_cast<size_t>(x);
+      const bool moves = x / 8 == t % (picture->width / 8) && y / 8 == 2;
+      for (size_t c = 0; c < 3; ++c) {
+        const int level = 60 + (7 * x + 3 * y + 11 * static_cast<int>(c)) % 80 + t % 5;
+        picture->at(c, p) = static_cast<uint8_t>(moves ? 230 : level);
+      }
+      if (alpha != Alpha::none)
+        picture->at(3, p) = static_cast<uint8_t>(alpha == Alpha::varying ? x % 200 : 200);
+    }
+}
+
+// From configure() to the end: two windows, a bit of a third, its end, and what else can be asked.
+void run(const Case& c) {
+  const allocator::Unseen unseen;
+  Picture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
+  const auto pixels = picture.pixels();
+  std::vector<uint8_t> mask(pixels), residual(pixels);
+  const auto see = [](auto work) {
+    const allocator::SeenAgain again;
+    work();
+  };
+  Engine engine;
+  Status status;
+  see([&] { status = engine.configure(options_of(c), c.width, c.height); });
+  ASSERT_TRUE(status.ok()) << status.message;
+  const auto pop = [&] {
+    if (!engine.ready()) return;
+    see([&] { engine.foreground(mask.data(), residual.data()); });
+    while (engine.ready()) see([&] { engine.pop(Output::mask, picture.out()); });
+    see([&] { engine.write_background(picture.out()); });
+  };
+  const int frames = 2 * c.window + c.window / 5 + 2;
+  for (int t = 0; t < frames; ++t) {
+    paint(t, c.alpha, &picture);
+    see([&] { status = engine.push(picture.in()); });
+    ASSERT_TRUE(status.ok()) << status.message;
+    pop();
+  }
+  see([&] { status = engine.drain(); });
+  ASSERT_TRUE(status.ok()) << status.message;
+  pop();
+  see([&] { engine.close(); });
+}
+
+bool asked_for(const char* name) { return std::getenv(name) != nullptr; }
+
+double peak_of(const Case& c) {
+  allocator::start();
+  run(c);
+  allocator::stop();
+  const auto seen = allocator::seen();
+  EXPECT_EQ(seen.blocks, 0) << "of " << seen.bytes << " bytes are left";
+  if (asked_for("QDMD_SHOW_SITES")) {
+    allocator::start();
+    allocator::note_sites(static_cast<int64_t>(0.995 * static_cast<double>(seen.peak)));
+    run(c);
+    allocator::stop();
+    std::fprintf(stderr, "== %s: %ld bytes\n", describe(c).c_str(), static_cast<long>(seen.peak));
+    allocator::print_sites(std::atoi(std::getenv("QDMD_SHOW_SITES")));
+  }
+  return static_cast<double>(seen.peak);
+}
+
+void check(const Case& c) {
+  SCOPED_TRACE(describe(c));
+  const double promised = promised_bytes(c), peak = peak_of(c);
+  const double ratio = peak / promised;
+  if (asked_for("QDMD_SHOW_MEMORY"))
+    std::printf("%-64s %11.0f %11.0f %6.3f\n", describe(c).c_str(), promised, peak, ratio);
+  EXPECT_NEAR(ratio, 1, 0.02) << promised << " promised, " << peak << " taken";
+}
+
+struct Size {
+  int width, height, window;
+};
+
+void check_all(Method method, Solver solver, std::initializer_list<Size> sizes) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (const Size& size : sizes)
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (Alpha alpha : {Alpha::none, Alpha::constant, Alpha::varying})
+        for (int threads : {1, 2, 4}) {
+          // In short: one thread without alpha, and most of both.
+          if (!asked_for("QDMD_LONG") && (alpha == Alpha::constant || threads == 2 ||
+                                          (threads == 1) != (alpha == Alpha::none)))
+            continue;
+          check({method, solver, mode, alpha, size.width, size.height, size.window, threads});
+        }
+}
+
+TEST(Memory, OfTheDefault) {
+  check_all(Method::robust, Solver::gram, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
+}
+
+TEST(Memory, OfQdmd) {
+  check_all(Method::qdmd, Solver::gram, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
+  check_all(Method::qdmd, Solver::gram_extended, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
+}
+
+TEST(Memory, OfQdmdFromPixels) {
+  check_all(Method::qdmd, Solver::qr, {{64, 48, 50}, {160, 120, 12}});
+  check_all(Method::qdmd, Solver::adjoint, {{64, 48, 12}, {32, 24, 20}});
+}
+
+TEST(Memory, OfDmd) {
+  check_all(Method::dmd, Solver::gram, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
+}
+
+}  // namespace
+}  // namespace qdmd::test
