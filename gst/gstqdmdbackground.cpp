@@ -31,6 +31,8 @@
  */
 #include "gst/gstqdmdbackground.h"
 
+#include <memory>
+#include <new>
 #include <utility>
 
 #include "gst/gstqdmdenums.h"
@@ -234,12 +236,13 @@ static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
 // ---- Class --------------------------------------------------------------------------------------
 
 static void gst_qdmd_background_finalize(GObject* object) {
-  delete GST_QDMD_BACKGROUND(object)->state;
+  std::destroy_at(GST_QDMD_BACKGROUND(object)->state);
   G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_qdmd_background_init(GstQdmdBackground* self) {
-  self->state = new qdmd::State();
+  // Nothing of it takes memory yet.
+  self->state = new (self->room_of_state) qdmd::State();
   // A decomposition in time needs every frame.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }

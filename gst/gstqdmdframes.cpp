@@ -181,7 +181,11 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   const GstFlowReturn flow =
       GST_BASE_TRANSFORM_GET_CLASS(self)->prepare_output_buffer(trans, shell.get(), &made);
   BufferPtr buffer(made);
-  if (flow != GST_FLOW_OK || !buffer) return flow;
+  if (flow != GST_FLOW_OK || !buffer) {
+    // Its frame is still in the engine, and nobody wants it.
+    drop_frames(self);
+    return flow;
+  }
   std::vector<Region> regions;
   {
     MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);

@@ -46,5 +46,7 @@ struct State {
 
 struct _GstQdmdBackground {
   GstVideoFilter parent;
+  // In the instance's own memory, for which GLib answers.
   qdmd::State* state;
+  alignas(qdmd::State) unsigned char room_of_state[sizeof(qdmd::State)];
 };

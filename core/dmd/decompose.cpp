@@ -100,10 +100,32 @@ int most_channel_pictures(const DmdOptions& options, int snapshots) {
   return kChannels * 2 * modes;
 }
 
-uint64_t decomposition_bytes(int snapshots) {
-  // The integer matrix, the quaternion matrix of it, and what factorizations keep of that.
+uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snapshots) {
+  const double m = snapshots, integers = kChannels * kChannels * sizeof(int64_t) * m * m;
+  // Eigen has temporary matrices below this on the stack.
+  const bool heap = sizeof(std::complex<double>) * m * m > EIGEN_STACK_ALLOCATION_LIMIT;
+  double beside = 0;
+  switch (options.solver) {
+    case Solver::gram:
+      beside = (heap ? 144 : 112) * m * m;
+      break;
+    case Solver::gram_extended:
+      beside = 208 * m * m;
+      break;
+    case Solver::qr:
+      // A block of rows, twice.
+      beside = 2 * sizeof(Quaterniond) * (std::max(512.0, 2 * m) + m) * m + 55 * m * m;
+      break;
+    case Solver::adjoint:
+      beside = adjoint_bytes(pixels, m);
+      break;
+  }
+  return static_cast<uint64_t>(integers + beside);
+}
+
+uint64_t channel_decomposition_bytes(int snapshots) {
   const auto m = static_cast<uint64_t>(snapshots);
-  return m * m * (kChannels * kChannels * sizeof(int64_t) + 8 * 4 * sizeof(double));
+  return 116 * m * m;
 }
 
 }  // namespace qdmd

@@ -1,6 +1,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <numeric>
 
 #include "core/dmd/qdmd.h"
@@ -37,8 +38,9 @@ std::vector<Eigen::Index> standard_eigenvalues(const Eigen::VectorXcd& values) {
 }  // namespace
 
 double adjoint_bytes(double pixels, double snapshots) {
-  // The adjoint of X, its copy inside the SVD, U and the modes: 2n x 2m complex doubles each.
-  return 4 * sizeof(std::complex<double>) * (2 * pixels) * (2 * snapshots);
+  // Seven times the adjoint of X, 2n x 2(m - 1) complex doubles: itself, its copies inside the SVD,
+  // U, the check of it, and the modes. Measured.
+  return 7 * sizeof(std::complex<double>) * (2 * pixels) * (2 * std::max(snapshots - 1, 1.0));
 }
 
 BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& options) {
@@ -47,6 +49,11 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   BackgroundModes result(m);
   if (m < 2 || x.rows() == 0) return result;
   const auto y = x.right_cols(m - 1);
+
+  // Eigen's SVD frees twice what it has where memory runs out in it: so see first that there is
+  // enough. A seventh of it, x and y, is there.
+  ::operator delete(::operator new(static_cast<size_t>(
+      adjoint_bytes(static_cast<double>(x.rows()), static_cast<double>(m)) * 6 / 7)));
 
   // Step 1, by the complex representation's SVD.
   const auto svd = dense_svd(x.left_cols(m - 1).adjoint());

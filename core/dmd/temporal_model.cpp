@@ -50,7 +50,10 @@ Eigen::MatrixXd TemporalModel::weights(double t) const {
 
 void TemporalModel::weights(double t, Eigen::MatrixXd* out) const {
   Eigen::MatrixXd& weights = *out;
-  weights.setZero(3, picture_count());
+  // Moved, and not resized: a matrix that finds no memory for another size is broken.
+  if (weights.cols() != picture_count() || weights.rows() != 3)
+    weights = Eigen::MatrixXd(3, picture_count());
+  weights.setZero();
   for (const Term& term : terms_) {
     const Quaterniond u = Quaterniond(power(term.lambda, t - term.reference_time)) * term.amplitude;
     if (term.channel < 0) {

@@ -25,38 +25,36 @@ auto Engine::flushed_if_it_throws(Action action) {
   }
 }
 
-Status Engine::configure(const EngineOptions& options, int width, int height) {
+Status Engine::configure(const EngineOptions& options, int width, int height) try {
   const Status status = check_options(options, width, height);
   if (!status.ok()) return status;
   // The old window goes first: two at once would break the promise of max-memory.
   close();
   options_ = options;
   layout_ = layout_of(options, width, height);
-  try {
-    auto learner = Learner::make(options, width, height);
-    const bool live = options.mode == Mode::live;
-    const LivePlan plan = plan_of(options, width, height);
-    workers_ = std::make_unique<Workers>(options.threads);
-    const uint64_t beside = layout_.bytes - layout_.frame_bytes;
-    frames_ = FrameStore(layout_.capacity, width, height, learner->contents(),
-                         options.max_memory - beside);
-    pace_.begin(front_of_efforts(learner->sample_steps()),
-                live ? plan.hop_size() : options.window_size);
-    // Where frames make room for others before their model is used, its modes are pictures.
-    background_ = std::make_unique<Background>(
-        std::move(learner),
-        LearnerRoom{&frames_, options.window_size, live, &workers_->pool(), &clock_});
-    background_->set_threshold(options.foreground_threshold);
-    const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
-    if (live)
-      schedule_ = std::make_unique<LiveSchedule>(stage, plan);
-    else
-      schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size);
-  } catch (...) {
-    close();
-    throw;
-  }
+  auto learner = Learner::make(options, width, height);
+  const bool live = options.mode == Mode::live;
+  const LivePlan plan = plan_of(options, width, height);
+  workers_ = std::make_unique<Workers>(options.threads);
+  const uint64_t beside = layout_.bytes - layout_.frame_bytes;
+  frames_ = FrameStore(layout_.capacity, width, height, learner->contents(),
+                       options.max_memory - beside);
+  pace_.begin(front_of_efforts(learner->sample_steps()),
+              live ? plan.hop_size() : options.window_size);
+  // Where frames make room for others before their model is used, its modes are pictures.
+  background_ = std::make_unique<Background>(
+      std::move(learner),
+      LearnerRoom{&frames_, options.window_size, live, &workers_->pool(), &clock_});
+  background_->set_threshold(options.foreground_threshold);
+  const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
+  if (live)
+    schedule_ = std::make_unique<LiveSchedule>(stage, plan);
+  else
+    schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size);
   return {};
+} catch (...) {
+  close();
+  throw;
 }
 
 void Engine::close() {

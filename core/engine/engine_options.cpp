@@ -59,13 +59,6 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
-  const EngineLayout layout = layout_of(options, width, height);
-  if (layout.bytes > options.max_memory)
-    return {Code::too_much_memory,
-            "A window-size of " + describe(options, width, height) + " needs " +
-                std::to_string(layout.bytes) + " bytes (" + std::to_string(layout.frame_bytes) +
-                " for its frames) and max-memory allows " + std::to_string(options.max_memory) +
-                ": lower window-size, scale the video down, or raise max-memory."};
   const uint64_t solver = Learner::make(options, width, height)->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
@@ -73,6 +66,13 @@ Status check_options(const EngineOptions& options, int width, int height) {
                 " needs about " + std::to_string(solver) + " bytes and max-memory allows " +
                 std::to_string(options.max_memory) +
                 ": use solver=gram, lower window-size, or scale the video down."};
+  const EngineLayout layout = layout_of(options, width, height);
+  if (layout.bytes > options.max_memory)
+    return {Code::too_much_memory,
+            "A window-size of " + describe(options, width, height) + " needs " +
+                std::to_string(layout.bytes) + " bytes (" + std::to_string(layout.frame_bytes) +
+                " for its frames) and max-memory allows " + std::to_string(options.max_memory) +
+                ": lower window-size, scale the video down, or raise max-memory."};
   return {};
 }
 

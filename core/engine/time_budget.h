@@ -77,7 +77,7 @@ class TimeBudget {
   void add(int frames, double seconds, const SolveCost& solve);
 
   // Of the stretches from now on.
-  const Effort& effort() const { return front_[chosen_]; }
+  Effort effort() const { return front_.empty() ? Effort() : front_[chosen_]; }
   // The cost model: seconds for each frame with that effort; 0 as long as nothing was measured.
   double predicted(const Effort& effort) const { return model_.predicted(effort); }
   double predicted() const { return predicted(effort()); }
@@ -85,7 +85,7 @@ class TimeBudget {
  private:
   void choose();
 
-  std::vector<Effort> front_ = {Effort()};
+  std::vector<Effort> front_;
   size_t chosen_ = 0;
   double budget_ = 0;
   CostModel model_;

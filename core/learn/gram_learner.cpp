@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/dmd/qdmd.h"
+#include "core/passes/sampling.h"
 
 namespace qdmd {
 namespace {
@@ -30,7 +31,10 @@ uint64_t GramLearner::bytes(int window_size, int capacity, bool keep_pictures, i
   if (keep_pictures) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
-  return SlidingGram::bytes(capacity, threads) + decomposition_bytes(window_size) +
+  const double seen = static_cast<double>(sample_count(width_, height_, step_));
+  return SlidingGram::bytes(capacity, threads) +
+         (options_.method == Method::dmd ? channel_decomposition_bytes(window_size)
+                                         : decomposition_bytes(dmd, seen, window_size)) +
          (keep_pictures ? 2 : 1) *
              BackgroundModel::bytes(pixels, window_size, pictures, keep_pictures);
 }
@@ -38,7 +42,7 @@ uint64_t GramLearner::bytes(int window_size, int capacity, bool keep_pictures, i
 uint64_t GramLearner::solver_bytes(int window_size) const {
   if (options_.method == Method::dmd || options_.dmd.solver != Solver::adjoint) return 0;
   return static_cast<uint64_t>(
-      adjoint_bytes(static_cast<double>(width_) * static_cast<double>(height_), window_size));
+      adjoint_bytes(static_cast<double>(sample_count(width_, height_, step_)), window_size));
 }
 
 void GramLearner::begin(const LearnerRoom& room) {

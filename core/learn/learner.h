@@ -85,7 +85,7 @@ class Learner {
   // True where the background in use is to have the light() of each frame.
   virtual bool follows_light() const { return false; }
   // Of the frame in `slot`, over the background in use.
-  virtual Gain light(int /*slot*/) const { return kSameLight; }
+  virtual Gain light(int /*slot*/) { return kSameLight; }
 };
 
 }  // namespace qdmd

@@ -40,7 +40,8 @@ void BackgroundModel::make_pictures(size_t count) {
 
 void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel& model,
                             bool keep_pictures) {
-  model_ = model;
+  // Moved, and not assigned: an Eigen matrix that finds no memory for another size is broken.
+  model_ = TemporalModel(model);
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
   frozen_ = false;
@@ -100,6 +101,8 @@ void BackgroundModel::set_time(double t) {
       time_weights_.row(static_cast<Eigen::Index>(c)) *= gain[c];
   }
   if (direct_) {
+    if (direct_weights_.cols() != basis_.cols())
+      direct_weights_ = Eigen::MatrixXd(kChannels, basis_.cols());
     direct_weights_.noalias() = time_weights_ * basis_;
     group_by_four(direct_weights_, &coefficients_);
     return;

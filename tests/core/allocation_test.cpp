@@ -75,7 +75,7 @@ std::string describe(Method method, int threads, Alpha alpha, double omega) {
 // The default as users get it, or plain Q-DMD.
 EngineOptions options_of(Method method, int window) {
   EngineOptions options;
-  options.dmd.method = method;
+  options.method = method;
   options.window_size = window;
   return options;
 }

@@ -61,7 +61,7 @@ Stack first_stack, failed_stack;
 std::atomic<bool> noting_places = false;
 std::atomic<int64_t> noting_from = 0;
 constexpr int64_t kMostPlaces = int64_t{1} << 20;
-uint64_t places[kMostPlaces];
+uint64_t places[kMostPlaces], place_sizes[kMostPlaces];
 
 // Blocks that are alive: open addressing, nearest free slot.
 struct Block {
@@ -183,7 +183,7 @@ bool sees(const void* caller) {
 }
 
 // Counts an allocation. False: it shall fail.
-bool allow() {
+bool allow(size_t size) {
   const int64_t n = ++allocations;
   if (n == 1) take_stack(&first_stack);
   if (const int64_t noted = n - noting_from; noting_places && noted <= kMostPlaces) {
@@ -194,6 +194,7 @@ bool allow() {
     for (int i = 0; i < std::min(stack.depth, 9); ++i)
       hash = (hash ^ reinterpret_cast<uintptr_t>(stack.frame[i])) * 0x100000001B3u;
     places[noted - 1] = hash;
+    place_sizes[noted - 1] = size;
   }
   if (n < fail_from || n >= fail_to) return true;
   ++failures;
@@ -294,6 +295,13 @@ void note_places() {
 
 uint64_t place(int64_t n) { return n <= kMostPlaces ? places[n - 1] : 0; }
 
+int64_t first_of(int64_t bytes) {
+  const int64_t noted = std::min(allocations.load() - noting_from, kMostPlaces);
+  for (int64_t n = 1; n <= noted; ++n)
+    if (place_sizes[n - 1] >= static_cast<uint64_t>(bytes)) return n;
+  return 0;
+}
+
 void note_sites(int64_t at) {
   sites_wanted_at = at;
   noting_sites = true;
@@ -341,7 +349,7 @@ namespace {
 template <typename Work>
 void* allocate(const void* caller, size_t size, Work work) {
   const bool sees = allocator::sees(caller);
-  if (sees && !allocator::allow()) return nullptr;
+  if (sees && !allocator::allow(size)) return nullptr;
   void* memory = work();
   if (sees && memory) allocator::add(memory, size);
   return memory;
@@ -372,7 +380,7 @@ namespace {
 
 void* reallocate(const void* caller, void* old, size_t size) {
   const bool sees = allocator::sees(caller);
-  if (sees && !allocator::allow()) return nullptr;
+  if (sees && !allocator::allow(size)) return nullptr;
   size_t old_size = 0;
   const bool known = allocator::remove(old, &old_size);
   void* memory = __libc_realloc(old, size);
@@ -427,7 +435,7 @@ void free(void* memory) { release(memory); }
 extern "C" {
 void* __wrap_malloc(size_t size);
 void* __wrap_malloc(size_t size) {
-  return allocator::sees(CALLER) && !allocator::allow() ? nullptr : __real_malloc(size);
+  return allocator::sees(CALLER) && !allocator::allow(size) ? nullptr : __real_malloc(size);
 }
 }
 

@@ -68,6 +68,8 @@ class SeenAgain {
 // same for those with the same callers.
 void note_places();
 uint64_t place(int64_t n);
+// The first allocation from then on of at least so many bytes; 0: there was none.
+int64_t first_of(int64_t bytes);
 // Notes the stack of every block, and what is alive when `bytes` first are.
 void note_sites(int64_t bytes);
 // To standard error, as `addr2line -fiCe` reads it: the first allocation since start(), the one

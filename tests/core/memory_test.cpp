@@ -28,7 +28,7 @@ struct Case {
 
 EngineOptions options_of(const Case& c) {
   EngineOptions options;
-  options.dmd.method = c.method;
+  options.method = c.method;
   options.dmd.solver = c.solver;
   options.mode = c.mode;
   options.window_size = c.window;
@@ -44,14 +44,6 @@ std::string describe(const Case& c) {
   return name + (c.mode == Mode::live ? " live " : " batch ") + std::to_string(c.width) + "x" +
          std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
          std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)];
-}
-
-// The bytes that an engine for `c` says it takes.
-double promised_bytes(const Case& c) {
-  const EngineLayout layout = layout_of(options_of(c), c.width, c.height);
-  double bytes = static_cast<double>(layout.bytes);
-  if (c.alpha == Alpha::varying) bytes += static_cast<double>(layout.capacity) * c.width * c.height;
-  return bytes;
 }
 
 // A light that goes up and down, and something that moves: all that a solve may need memory for.
@@ -71,7 +63,8 @@ void paint(int t, Alpha alpha, Picture* picture) {
 }
 
 // From configure() to the end: two windows, a bit of a third, its end, and what else can be asked.
-void run(const Case& c) {
+// Returns the bytes that the engine says it takes.
+double run(const Case& c) {
   const allocator::Unseen unseen;
   Picture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
   const auto pixels = picture.pixels();
@@ -83,7 +76,7 @@ void run(const Case& c) {
   Engine engine;
   Status status;
   see([&] { status = engine.configure(options_of(c), c.width, c.height); });
-  ASSERT_TRUE(status.ok()) << status.message;
+  EXPECT_TRUE(status.ok()) << status.message;
   const auto pop = [&] {
     if (!engine.ready()) return;
     see([&] { engine.foreground(mask.data(), residual.data()); });
@@ -94,20 +87,27 @@ void run(const Case& c) {
   for (int t = 0; t < frames; ++t) {
     paint(t, c.alpha, &picture);
     see([&] { status = engine.push(picture.in()); });
-    ASSERT_TRUE(status.ok()) << status.message;
+    EXPECT_TRUE(status.ok()) << status.message;
     pop();
   }
   see([&] { status = engine.drain(); });
-  ASSERT_TRUE(status.ok()) << status.message;
+  EXPECT_TRUE(status.ok()) << status.message;
   pop();
+  const auto promised = static_cast<double>(engine.bytes());
   see([&] { engine.close(); });
+  return promised;
 }
 
 bool asked_for(const char* name) { return std::getenv(name) != nullptr; }
 
-double peak_of(const Case& c) {
+struct Bytes {
+  double promised, peak;
+};
+Bytes bytes_of(const Case& c) {
+  // The list of kernels is made once for the process.
+  kernels();
   allocator::start();
-  run(c);
+  const double promised = run(c);
   allocator::stop();
   const auto seen = allocator::seen();
   EXPECT_EQ(seen.blocks, 0) << "of " << seen.bytes << " bytes are left";
@@ -119,16 +119,20 @@ double peak_of(const Case& c) {
     std::fprintf(stderr, "== %s: %ld bytes\n", describe(c).c_str(), static_cast<long>(seen.peak));
     allocator::print_sites(std::atoi(std::getenv("QDMD_SHOW_SITES")));
   }
-  return static_cast<double>(seen.peak);
+  return {promised, static_cast<double>(seen.peak)};
 }
 
 void check(const Case& c) {
   SCOPED_TRACE(describe(c));
-  const double promised = promised_bytes(c), peak = peak_of(c);
+  const auto [promised, peak] = bytes_of(c);
   const double ratio = peak / promised;
   if (asked_for("QDMD_SHOW_MEMORY"))
     std::printf("%-64s %11.0f %11.0f %6.3f\n", describe(c).c_str(), promised, peak, ratio);
-  EXPECT_NEAR(ratio, 1, 0.02) << promised << " promised, " << peak << " taken";
+  // The channels' modes may be complex, which takes four times the pictures of real ones; what
+  // Eigen keeps for the paper's procedure is not quite a multiple of the pixels.
+  const double least = c.method == Method::dmd ? 0.4 : c.solver == Solver::adjoint ? 0.9 : 0.98;
+  EXPECT_LE(ratio, 1.02) << promised << " promised, " << peak << " taken";
+  EXPECT_GE(ratio, least) << promised << " promised, " << peak << " taken";
 }
 
 struct Size {
@@ -159,7 +163,7 @@ TEST(Memory, OfQdmd) {
 }
 
 TEST(Memory, OfQdmdFromPixels) {
-  check_all(Method::qdmd, Solver::qr, {{64, 48, 50}, {160, 120, 12}});
+  check_all(Method::qdmd, Solver::qr, {{64, 48, 50}, {160, 120, 12}, {160, 120, 100}});
   check_all(Method::qdmd, Solver::adjoint, {{64, 48, 12}, {32, 24, 20}});
 }
 

@@ -41,7 +41,7 @@ constexpr int kWindow = 6, kHop = 2;
 
 EngineOptions options_of(const Case& c) {
   EngineOptions options;
-  options.dmd.method = c.method;
+  options.method = c.method;
   options.dmd.solver = c.solver;
   options.mode = c.mode;
   options.window_size = kWindow;
@@ -118,18 +118,14 @@ class Owner {
     EngineOptions options = options_of(case_);
     if (threads > 0) options.threads = threads;
     const auto& frame = frames().front();
-    configuring_ = true;
     take(call([&] { return engine_->configure(options, frame.width, frame.height); }));
-    configuring_ = false;
     waiting_ = 0;
     time_ = 0;
   }
   void push(bool look = false) {
     const Picture& frame = frames()[static_cast<size_t>(time_++) % frames().size()];
     const ImageView view = const_cast<Picture&>(frame).in();
-    pushing_ = true;
     const Status status = call([&] { return engine_->push(view); });
-    pushing_ = false;
     if (status.ok()) ++waiting_;
     take(status);
     pop(look);
@@ -178,12 +174,8 @@ class Owner {
 
   // After all that succeeded, and after a failure.
   void check_pending(bool failed) {
-    const int pending = engine_->pending();
-    // A frame that was refused may wait all the same; a new size may have ended what was before.
-    const bool right = pending == waiting_ || (failed && pushing_ && pending == waiting_ + 1) ||
-                       (failed && configuring_ && pending == 0);
-    EXPECT_TRUE(right) << pending << " are pending, " << waiting_ << " were taken";
-    pushing_ = configuring_ = false;
+    // What waits is lost with the call that failed.
+    EXPECT_EQ(engine_->pending(), failed ? 0 : waiting_);
   }
   // What is ready must be there, too, after a failure.
   void pop_what_is_ready() {
@@ -207,7 +199,7 @@ class Owner {
   const std::vector<Picture>&frames_, &small_frames_;
   std::vector<uint8_t> mask_, residual_;
   int waiting_ = 0, time_ = 0;
-  bool small_ = false, keep_ = true, pushing_ = false, configuring_ = false;
+  bool small_ = false, keep_ = true;
 };
 
 // What an engine may meet, in parts that can fail by themselves.
@@ -403,7 +395,13 @@ void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
     const auto all = run({c, part, 0, Failing::one}, right, true);
     ASSERT_TRUE(all.has_value());
     std::vector<int64_t> numbers;
-    for (int64_t n = 1; n <= *all; ++n)
+    int64_t last = *all;
+    // Eigen's SVD frees twice what it has where memory runs out in it. The solver sees first
+    // whether there is enough; what comes after that allocation cannot be tried.
+    if (c.solver == Solver::adjoint)
+      if (const int64_t foreseen = allocator::first_of(350 * kSmallWidth * kSmallHeight))
+        last = foreseen;
+    for (int64_t n = 1; n <= last; ++n)
       if (tried->insert(allocator::place(n)).second) numbers.push_back(n);
     if (asked_for("QDMD_SHOW_OOM")) {
       std::printf("%s, %s: %ld allocations, %zu new places\n", describe(c).c_str(), part.name,
@@ -414,8 +412,8 @@ void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
       for (int64_t n : numbers) run({c, part, n, n % 3 == 0 ? Failing::all : Failing::one}, right);
     } else {
       for (Failing failing : {Failing::one, Failing::all})
-        for (int64_t n = 1; !run({c, part, n, failing}, right) && !testing::Test::HasFailure(); ++n)
-          ;
+        for (int64_t n = 1; n <= last && !testing::Test::HasFailure(); ++n)
+          run({c, part, n, failing}, right);
     }
     if (testing::Test::HasFailure()) return;
   }

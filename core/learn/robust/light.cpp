@@ -41,11 +41,13 @@ float agreement(const float* const frame[3], const float* const reference[3], si
 }
 
 // The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
-Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells) {
+Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells,
+                 LightScratch* scratch) {
   constexpr int kBins = 300;
   constexpr float kBin = 0.02f, kLowest = -3, kNear = 0.05f;
   std::array<int, kBins + 4> histogram{};
-  std::vector<std::pair<float, size_t>> ratios;
+  auto& ratios = scratch->ratios;
+  ratios.clear();
   for (size_t cell = 0; cell < cells; ++cell) {
     const float f = gray(frame, cell), r = gray(reference, cell);
     if (f <= kDark || r <= kDark || f >= kBright || r >= kBright) continue;
@@ -63,7 +65,7 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   }
   const float mode = kLowest + (static_cast<float>(best) + 0.5f) * kBin;
   Gain gain = kSameLight;
-  std::vector<float> near;
+  auto& near = scratch->near;
   for (size_t c = 0; c < kChannels; ++c) {
     near.clear();
     for (const auto& [ratio, cell] : ratios)
@@ -75,7 +77,8 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   return gain;
 }
 
-Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, int reference) {
+Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, int reference,
+               LightScratch* scratch) {
   const float* const frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
   const float* const background[3] = {references.plane(reference, 0),
                                       references.plane(reference, 1),
@@ -83,7 +86,7 @@ Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, in
   const float before = agreement(frame, background, frames.cells(), kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
-  const Gain gain = shared_gain(frame, background, frames.cells());
+  const Gain gain = shared_gain(frame, background, frames.cells(), scratch);
   const float after = agreement(frame, background, frames.cells(), gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
@@ -118,18 +121,20 @@ GridFrames median_frame(const GridFrames& frames, int count, const std::vector<G
   return result;
 }
 
-Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference) {
-  return without_noise(gain_over(frames, frame, background, reference));
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
+                LightScratch* scratch) {
+  return without_noise(gain_over(frames, frame, background, reference, scratch));
 }
 
 std::vector<Gain> light_of(const GridFrames& frames, int count) {
   std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
   if (count < 2) return gains;
+  LightScratch scratch(frames.cells());
   // The second reference is sharper where light changed.
   for (int round = 0; round < 2; ++round) {
     const GridFrames reference = median_frame(frames, count, gains);
     for (int t = 0; t < count; ++t)
-      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0);
+      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0, &scratch);
     if (std::none_of(gains.begin(), gains.end(), is_lit)) return gains;
   }
   settle_light(&gains);

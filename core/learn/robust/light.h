@@ -1,6 +1,8 @@
 // Global changes of light: how much brighter a frame is than another picture of the same scene.
 #pragma once
 
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/passes/grid.h"
@@ -15,9 +17,26 @@ std::vector<Gain> light_of(const GridFrames& frames, int count);
 // Each cell's median over frames 0 .. count - 1 (64 of them at most) in unit light, as frame 0.
 GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains);
 
+// Memory for comparing two pictures of so many cells, which can serve many calls.
+class LightScratch {
+ public:
+  LightScratch() = default;
+  explicit LightScratch(size_t cells) {
+    ratios.reserve(cells);
+    near.reserve(cells);
+  }
+  static uint64_t bytes(uint64_t cells) {
+    return cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
+  }
+
+  std::vector<std::pair<float, size_t>> ratios;
+  std::vector<float> near;
+};
+
 // The gain of one frame over picture `reference` of `background`, both on the same grid; 1 where it
 // does not explain what they differ in, or is small.
-Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference);
+Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
+                LightScratch* scratch);
 
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.

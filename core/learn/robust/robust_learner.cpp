@@ -53,11 +53,11 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
   const uint64_t pictures = pixels() * (2 * kChannels + 4);
-  const uint64_t kept = pictures + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
-                        StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
-                        PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
-                        SlidingGram::bytes(capacity, threads) +
-                        static_cast<uint64_t>(window_size) * sizeof(Gain);
+  const uint64_t kept =
+      pictures + LightScratch::bytes(grid_.cells()) + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
+      StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
+      PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
+      SlidingGram::bytes(capacity, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
   const uint64_t models = (keep_pictures ? 2 : 1) *
                           (BackgroundModel::bytes(pixels(), window_size,
                                                   most_pictures(options_.dmd, window_size), true) +
@@ -68,7 +68,10 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
   return kept + models +
-         std::max({start, pixels(), masks, decomposition_bytes(window_size), filling});
+         std::max({start, pixels(), masks,
+                   decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
+                                       window_size),
+                   filling});
 }
 
 uint64_t RobustLearner::solver_bytes(int window_size) const {
@@ -82,6 +85,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   const int capacity = room.frames->capacity();
   if (room.keep_pictures) options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
+  light_scratch_ = LightScratch(grid_.cells());
   earlier_ = Earlier(grid_);
   mask_ = WindowMask(capacity, pixels());
   samples_ = Window(capacity, samples_at(finest_step_));
@@ -129,7 +133,9 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   if (earlier_.known()) {
     const GridFrames here = median_frame(frames, m, gains_);
     pictures.emplace_back();
-    choose(earlier_.cells(), 0, count, earlier_.picture(light_over(earlier_.cells(), 0, here, 0)));
+    LightScratch scratch(grid_.cells());
+    const Gain gain = light_over(earlier_.cells(), 0, here, 0, &scratch);
+    choose(earlier_.cells(), 0, count, earlier_.picture(gain));
     recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
   }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,

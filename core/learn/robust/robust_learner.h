@@ -59,8 +59,8 @@ class RobustLearner : public Learner {
   void publish() override { published_ = 1 - published_; }
 
   bool follows_light() const override { return true; }
-  Gain light(int slot) const override {
-    return light_over(room_.frames->cells(), slot, background_cells_, published_);
+  Gain light(int slot) override {
+    return light_over(room_.frames->cells(), slot, background_cells_, published_, &light_scratch_);
   }
 
  private:
@@ -82,6 +82,7 @@ class RobustLearner : public Learner {
   LearnerRoom room_ = {};
   GridFrames background_cells_;  // of the published and the newest solve, in unit light
   int published_ = 0;
+  LightScratch light_scratch_;  // of light()
   Earlier earlier_;
   // Of the newest solve: its snapshots, the share of them that no solve before had, frames that the
   // start compared, and what it found.
