@@ -36,9 +36,9 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   const bool live = options.mode == Mode::live;
   const LivePlan plan = plan_of(options, width, height);
   workers_ = std::make_unique<Workers>(options.threads);
-  const uint64_t beside = layout_.bytes - layout_.frame_bytes;
-  frames_ = FrameStore(layout_.capacity, width, height, learner->contents(),
-                       options.max_memory - beside);
+  const uint64_t beside = layout_.bytes - layout_.store_bytes;
+  frames_ =
+      FrameStore(layout_.capacity, width, height, learner->contents(), options.max_memory - beside);
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   // Where frames make room for others before their model is used, its modes are pictures.
@@ -96,7 +96,7 @@ Status Engine::alpha_refused() const {
       Status::Code::too_much_memory,
       "A window-size of " + describe(options_, frames_.width(), frames_.height()) +
           " whose alpha varies needs " +
-          std::to_string(layout_.bytes - layout_.frame_bytes + frames_.bytes_with_alpha()) +
+          std::to_string(layout_.bytes - layout_.store_bytes + frames_.bytes_with_alpha()) +
           " bytes and max-memory allows " + std::to_string(options_.max_memory) +
           ": lower window-size, scale the video down, take the alpha out, or raise max-memory."};
 }
@@ -114,7 +114,7 @@ Status Engine::drain() {
 }
 
 uint64_t Engine::bytes() const {
-  return configured() ? layout_.bytes - layout_.frame_bytes + frames_.bytes() : 0;
+  return configured() ? layout_.bytes - layout_.store_bytes + frames_.bytes() : 0;
 }
 
 void Engine::set_foreground_threshold(double threshold) {

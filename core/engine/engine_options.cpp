@@ -29,9 +29,11 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   layout.sample_step = learner->sample_steps().front();
   layout.capacity = options.window_size;
   if (live) layout.capacity += plan_for(options, *learner, width, height).most_late_frames();
-  layout.frame_bytes = FrameStore::bytes(layout.capacity, width, height, learner->contents());
+  layout.frame_bytes =
+      PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner->contents());
   layout.bytes = saturating_sum(
-      saturating_sum(layout.frame_bytes, options.caller_bytes),
+      saturating_sum(layout.store_bytes, options.caller_bytes),
       learner->bytes(options.window_size, layout.capacity, live, Workers::count(options.threads)));
   return layout;
 }

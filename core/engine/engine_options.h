@@ -32,7 +32,8 @@ struct EngineLayout {
   int capacity = 0;  // frames that are kept: the window's, in live mode also those that arrive
                      // while one is solved
   int sample_step = 1;
-  uint64_t frame_bytes = 0;  // of the frames that are kept, with all that belongs to them
+  uint64_t frame_bytes = 0;  // of the planes of the frames that are kept
+  uint64_t store_bytes = 0;  // of these and of all that belongs to a frame
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);

@@ -183,7 +183,7 @@ TEST(LiveGram, TenThousandSlidesInGroupsAndSlicesLeaveTheSameBits) {
     const auto frames = static_cast<int>(10'000 + slide.window);
     for (int frame = 1; frame <= frames; ++frame) {
       append_frame(window, random_picture(kPixels, rng, 0, frame % 3 == 0 ? 255 : 254));
-      const LivePlan::Step step = plan.next();
+      const LivePlan::Step step = schedule.next();
       if (step.group > 0) {
         ASSERT_EQ(done, slices);
         group = step.group;

@@ -208,17 +208,17 @@ TEST(SampleStep, BytesOfTheFrames) {
   const auto frames = [](int count, uint64_t samples) {
     return uint64_t(count) * (3 * samples + 2);
   };
-  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480));
+  EXPECT_EQ(layout_of(options, 640, 480).store_bytes, frames(10, 640 * 480));
   EXPECT_EQ(layout_of(options, 640, 480).capacity, 10);
-  EXPECT_EQ(layout_of(options, 1, 1).frame_bytes, frames(10, 64));
+  EXPECT_EQ(layout_of(options, 1, 1).store_bytes, frames(10, 64));
   options.sample_step = 1;
-  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480));
+  EXPECT_EQ(layout_of(options, 640, 480).store_bytes, frames(10, 640 * 480));
   options.sample_step = 2;
-  EXPECT_EQ(layout_of(options, 640, 480).frame_bytes, frames(10, 640 * 480 + 320 * 240));
-  EXPECT_EQ(layout_of(options, 641, 481).frame_bytes,
+  EXPECT_EQ(layout_of(options, 640, 480).store_bytes, frames(10, 640 * 480 + 320 * 240));
+  EXPECT_EQ(layout_of(options, 641, 481).store_bytes,
             frames(10, (641 * 481 + 63) / 64 * 64 + (321 * 241 + 63) / 64 * 64));
   options.sample_step = 64;
-  EXPECT_EQ(layout_of(options, 5, 5).frame_bytes, frames(10, 64 + 64));
+  EXPECT_EQ(layout_of(options, 5, 5).store_bytes, frames(10, 64 + 64));
   EXPECT_EQ(layout_of(options, 5, 5).sample_step, 64);
   // Small live windows need nothing beside; of large frames, those that arrive during a solve.
   options = live_of(10);
@@ -227,7 +227,7 @@ TEST(SampleStep, BytesOfTheFrames) {
   const EngineLayout layout = layout_of(options, 1920, 1080);
   EXPECT_EQ(layout.capacity, 100 + LivePlan(100, 25, uint64_t{3} * 1920 * 1080).most_late_frames());
   EXPECT_GT(layout.capacity, 100);
-  EXPECT_EQ(layout.frame_bytes, frames(layout.capacity, 1920 * 1080));
+  EXPECT_EQ(layout.store_bytes, frames(layout.capacity, 1920 * 1080));
 }
 
 TEST(SampleStep, ChosenStepIsOneWhereDigitsMatter) {

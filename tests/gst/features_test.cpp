@@ -441,7 +441,8 @@ TEST(TimeBudget, TakesWhatIsSetAsTheMost) {
   EXPECT_EQ(3u, stat_of(element, "iterations"));
   EXPECT_EQ(2u, stat_of(element, "sample-step"));
   stream.push_many(4, 4 * 40);
-  EXPECT_EQ(1u, stat_of(element, "iterations"));
+  // Iterations are what they are set to: fewer would bring hardly anything back.
+  EXPECT_EQ(3u, stat_of(element, "iterations"));
   EXPECT_EQ(4u, stat_of(element, "sample-step"));
   EXPECT_EQ(16u, stat_of(element, "solve-period"));
   // Whatever fits, it is no more than what was set.

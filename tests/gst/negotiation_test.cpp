@@ -250,6 +250,83 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   gst_object_unref(element);
 }
 
+// ---- Settings that a method does not look at ----
+
+// The element's warnings while it lives, each with what it says.
+class Warnings {
+ public:
+  Warnings() {
+    gst_debug_set_threshold_for_name("qdmdbackground", GST_LEVEL_WARNING);
+    gst_debug_add_log_function(&note, &all_, nullptr);
+  }
+  ~Warnings() {
+    gst_debug_remove_log_function_by_data(&all_);
+    gst_debug_unset_threshold_for_name("qdmdbackground");
+  }
+  const std::vector<std::string>& all() const { return all_; }
+
+ private:
+  static void note(GstDebugCategory* category, GstDebugLevel level, const gchar*, const gchar*,
+                   gint, GObject*, GstDebugMessage* message, gpointer data) {
+    if (level == GST_LEVEL_WARNING &&
+        std::string(gst_debug_category_get_name(category)) == "qdmdbackground")
+      static_cast<std::vector<std::string>*>(data)->push_back(gst_debug_message_get(message));
+  }
+  std::vector<std::string> all_;
+};
+
+std::vector<std::string> warnings_of(const std::string& properties) {
+  const Warnings warnings;
+  Stream stream("qdmdbackground window-size=4 " + properties, GST_VIDEO_FORMAT_RGB, 16, 12);
+  stream.push_many(0, 6);
+  // New caps are no reason to say it again.
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 18, 12);
+  stream.push_many(6, 2);
+  return warnings.all();
+}
+
+TEST(Settings, WithoutEffectAreWarnedOfOnce) {
+  struct Case {
+    const char *properties, *method, *name;
+  };
+  for (const Case& c : {Case{"amplitude=first-frame", "robust", "amplitude"},
+                        {"method=qdmd iterations=3", "qdmd", "iterations"},
+                        {"method=dmd solver=qr", "dmd", "solver"}}) {
+    const auto warnings = warnings_of(c.properties);
+    ASSERT_EQ(1u, warnings.size()) << c.properties;
+    for (const char* word : {c.method, c.name})
+      EXPECT_NE(std::string::npos, warnings[0].find(word)) << warnings[0];
+  }
+}
+
+TEST(Settings, ThatCountAreNotWarnedOf) {
+  for (const char* properties :
+       {"", "solver=qr rank=2 iterations=2 omega-threshold=0.1 sample-step=2",
+        "method=qdmd amplitude=first-frame solver=gram-extended",
+        "method=dmd amplitude=first-frame"})
+    EXPECT_TRUE(warnings_of(properties).empty()) << properties;
+}
+
+// What is not looked at changes no picture.
+TEST(Settings, WithoutEffectHaveNone) {
+  const auto pictures_of = [](const std::string& properties) {
+    Stream stream("qdmdbackground window-size=6 " + properties, GST_VIDEO_FORMAT_RGB, 40, 24);
+    stream.push_many(0, 8);
+    stream.eos();
+    std::vector<uint8_t> bytes;
+    for (const BufferPtr& buffer : stream.take_all()) {
+      GstMapInfo map;
+      EXPECT_TRUE(gst_buffer_map(buffer.get(), &map, GST_MAP_READ));
+      bytes.insert(bytes.end(), map.data, map.data + map.size);
+      gst_buffer_unmap(buffer.get(), &map);
+    }
+    return bytes;
+  };
+  EXPECT_EQ(pictures_of(""), pictures_of("amplitude=first-frame"));
+  EXPECT_EQ(pictures_of("method=qdmd"), pictures_of("method=qdmd iterations=4"));
+  EXPECT_EQ(pictures_of("method=dmd"), pictures_of("method=dmd solver=qr iterations=2"));
+}
+
 TEST(Stats, CountFramesAndSolves) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
   stream.push_many(0, 12);

@@ -1,0 +1,139 @@
+// A window's frames with all that belongs to them: planes, samples, cells, alpha.
+#include "core/frames/frame_store.h"
+
+#include <deque>
+
+#include "core/passes/sampling.h"
+#include "tests/core/engine_util.h"
+
+namespace qdmd::test {
+namespace {
+
+constexpr int kWidth = 37, kHeight = 23;
+
+Picture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1) {
+  Picture picture(kWidth, kHeight, with_alpha ? 4 : 3, with_alpha, 5);
+  for (uint8_t& byte : picture.bytes) byte = static_cast<uint8_t>(rng() >> 7);
+  if (constant_alpha >= 0)
+    for (size_t p = 0; p < picture.pixels(); ++p)
+      picture.at(3, p) = static_cast<uint8_t>(constant_alpha);
+  return picture;
+}
+
+// Everything that the store says of a frame, by its definition.
+void expect_frame(const FrameStore& store, int index, Picture& picture, int step) {
+  const int slot = store.slot(index);
+  const auto at = [&](size_t c, int x, int y) {
+    return picture.at(c, static_cast<size_t>(y) * kWidth + static_cast<size_t>(x));
+  };
+  for (int c = 0; c < kChannels; ++c) {
+    const uint8_t* plane = store.window().plane(slot, c);
+    const uint8_t* sample = store.samples().plane(slot, c);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        ASSERT_EQ(*plane++, at(static_cast<size_t>(c), x, y));
+        if (x % step == 0 && y % step == 0) {
+          ASSERT_EQ(*sample++, at(static_cast<size_t>(c), x, y));
+        }
+      }
+    const Grid& grid = store.grid();
+    for (int row = 0; row < grid.rows; ++row)
+      for (int col = 0; col < grid.cols; ++col) {
+        int sum = 0, count = 0;
+        for (int y = grid.top(row); y < grid.top(row + 1); ++y)
+          for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
+            sum += at(static_cast<size_t>(c), x, y);
+        // One division, one rounding to float.
+        ASSERT_EQ(store.cells().plane(slot, c)[row * grid.cols + col],
+                  static_cast<float>(static_cast<double>(sum) / count));
+      }
+  }
+}
+
+TEST(FrameStore, HasAllThatBelongsToTheNewestFrames) {
+  std::mt19937 rng(401);
+  for (int step : {1, 3, 64})
+    for (int along : {0, 1, 7, 23}) {
+      FrameStore store(4, kWidth, kHeight, {step, along});
+      std::deque<Picture> held;
+      for (int t = 0; t < 11; ++t) {
+        held.push_back(random_frame(rng, false));
+        if (held.size() > 4) held.pop_front();
+        ASSERT_TRUE(store.append(held.back().in()));
+        ASSERT_EQ(store.frames_taken(), static_cast<uint64_t>(t) + 1);
+        ASSERT_EQ(static_cast<size_t>(store.size()), held.size());
+        for (int i = 0; i < store.size(); ++i)
+          expect_frame(store, i, held[static_cast<size_t>(i)], step);
+        if (t != 6) continue;
+        store.clear();
+        held.clear();
+      }
+    }
+}
+
+TEST(FrameStore, KeepsAlphaOnceItVaries) {
+  std::mt19937 rng(402);
+  FrameStore store(3, kWidth, kHeight, {});
+  const uint64_t without = store.bytes();
+  EXPECT_EQ(without, FrameStore::bytes(3, kWidth, kHeight, {}));
+  EXPECT_EQ(store.bytes_with_alpha(), without + 3 * kWidth * kHeight);
+  Picture constant = random_frame(rng, true, 77);
+  ASSERT_TRUE(store.append(constant.in()));
+  EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
+  EXPECT_EQ(store.constant_alpha(store.slot(0)), 77);
+  EXPECT_EQ(store.bytes(), without);
+  Picture varying = random_frame(rng, true);
+  ASSERT_TRUE(store.append(varying.in()));
+  EXPECT_EQ(store.bytes(), store.bytes_with_alpha());
+  EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
+  for (size_t p = 0; p < varying.pixels(); ++p)
+    ASSERT_EQ(store.alpha(store.slot(1))[p], varying.at(3, p));
+  // A slot that varied and is constant again.
+  for (int t = 0; t < 3; ++t) ASSERT_TRUE(store.append(constant.in()));
+  EXPECT_EQ(store.alpha(store.slot(1)), nullptr);
+  EXPECT_EQ(store.constant_alpha(store.slot(1)), 77);
+}
+
+TEST(FrameStore, RefusesAlphaForWhichThereIsNoRoom) {
+  std::mt19937 rng(403);
+  const uint64_t needed = FrameStore::bytes(3, kWidth, kHeight, {}) + 3 * kWidth * kHeight;
+  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  for (uint64_t most : {needed - 1, needed}) {
+    FrameStore store(3, kWidth, kHeight, {}, most);
+    EXPECT_TRUE(store.append(constant.in()));
+    EXPECT_EQ(store.append(varying.in()), most == needed);
+  }
+}
+
+// The engine counts it, too, and says what to change.
+TEST(EngineMemory, OfAlphaThatVaries) {
+  std::mt19937 rng(404);
+  EngineOptions options;
+  options.window_size = 5;
+  const uint64_t without = layout_of(options, kWidth, kHeight).bytes,
+                 with = without + 5 * kWidth * kHeight;
+  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  for (uint64_t most : {without, with - 1, with}) {
+    options.max_memory = most;
+    Engine engine;
+    ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+    EXPECT_EQ(engine.bytes(), without);
+    ASSERT_TRUE(engine.push(constant.in()).ok());
+    const Status status = engine.push(varying.in());
+    EXPECT_EQ(status.ok(), most == with) << status.message;
+    if (status.ok()) {
+      EXPECT_EQ(engine.bytes(), with);
+      continue;
+    }
+    EXPECT_EQ(status.code, Status::Code::too_much_memory);
+    for (const std::string& word : {std::string("window-size"), std::string("max-memory"),
+                                    std::to_string(with), std::to_string(most)})
+      EXPECT_NE(status.message.find(word), std::string::npos) << word << " in " << status.message;
+    // Nothing is left, and it goes on.
+    EXPECT_EQ(engine.pending(), 0);
+    EXPECT_TRUE(engine.push(constant.in()).ok());
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test
