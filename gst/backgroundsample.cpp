@@ -1,6 +1,7 @@
 #include "gst/backgroundsample.h"
 
 #include <exception>
+#include <utility>
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug

@@ -12,19 +12,20 @@ namespace qdmd {
 // Calls are with the lock that protects the engine.
 class BackgroundSample {
  public:
-  // Pictures from now on are of these caps. The newest one of others was kept before.
+  // Pictures from now on are of these caps. Call keep() before.
   void set_caps(const GstVideoInfo& info, CapsPtr caps);
   // A solve was published; the frames that come out with it have this time.
   void solved(const GstSegment& segment, GstClockTime timestamp, GstClockTime duration);
-  // The newest background, which is made of the engine's where that has a newer one; null before
-  // the first solve, and where there is no memory for it.
+  // The newest background. It is made now where the engine has a newer one than the last. Null
+  // before the first solve, and where there is no memory for it.
   GstSample* get(Engine& engine, FrameIo& io);
-  // The engine is about to forget its background: the picture of it stays.
+  // The engine is about to forget its background: the picture of it stays. After an error, which
+  // makes it forget at once, the picture is the last that somebody asked for.
   void keep(Engine& engine, FrameIo& io) {
     SamplePtr(get(engine, io));
     newer_ = false;
   }
-  // There is none, as long as nothing is solved.
+  // Null until the next solve.
   void forget();
 
  private:

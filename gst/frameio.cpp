@@ -18,6 +18,7 @@ int rows_of(const GstVideoFrame& frame, int c) {
 }  // namespace
 
 guint64 FrameIo::bytes(const GstVideoInfo& info) {
+  // Planes of R, G and B can be read in place where their strides are equal, as they mostly are.
   if (!GST_VIDEO_INFO_IS_YUV(&info)) return 0;
   return 3 * guint64(GST_VIDEO_INFO_WIDTH(&info)) * guint64(GST_VIDEO_INFO_HEIGHT(&info));
 }

@@ -15,6 +15,8 @@ class FrameIo {
  public:
   // What it takes for frames of `info`.
   static guint64 bytes(const GstVideoInfo& info);
+  // Gives it back.
+  void clear() { std::vector<uint8_t>().swap(samples_); }
 
   ImageView read(const MappedVideoFrame& frame);
   // Calls fill(view), which writes what `output` says, and puts it into the frame. In Y, U and V a

@@ -82,8 +82,12 @@ void drop_frames(GstQdmdBackground* self) {
 
 void close(GstQdmdBackground* self) {
   drop_frames(self);
-  const std::lock_guard lock(self->state->engine_lock);
-  self->state->engine.close();
+  State* state = self->state;
+  state->mask = {};
+  state->residual = {};
+  const std::lock_guard lock(state->engine_lock);
+  state->engine.close();
+  state->io.clear();
 }
 
 // Copies what others may want to know of the engine.
@@ -100,34 +104,47 @@ static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 f
   GST_OBJECT_UNLOCK(self);
 }
 
-// Says what a new solve found. The frames that wait are those that come out with it.
+// The time of the frames that wait: those that come out with a new solve.
+struct FrameTime {
+  GstClockTime timestamp = GST_CLOCK_TIME_NONE, duration = GST_CLOCK_TIME_NONE;
+};
+static FrameTime time_of_waiting(const State& state) {
+  FrameTime time;
+  if (state.shells.empty()) return time;
+  GstBuffer *first = state.shells.front(), *last = state.shells.back();
+  time.timestamp = GST_BUFFER_PTS(first);
+  if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
+      GST_BUFFER_PTS(last) >= time.timestamp)
+    time.duration = GST_BUFFER_PTS(last) - time.timestamp +
+                    (GST_BUFFER_DURATION_IS_VALID(last) ? GST_BUFFER_DURATION(last) : 0);
+  return time;
+}
+
+// After a call that may solve, with the engine lock: the property's picture and its time belong
+// together.
+static void note_solve(GstQdmdBackground* self) {
+  State* state = self->state;
+  if (state->engine.solves() == state->solves_told) return;
+  const FrameTime time = time_of_waiting(*state);
+  state->background.solved(GST_BASE_TRANSFORM(self)->segment, time.timestamp, time.duration);
+}
+
+// Says what a new solve found.
 static void tell_of_solve(GstQdmdBackground* self) {
   State* state = self->state;
   if (state->engine.solves() == state->solves_told || state->shells.empty()) return;
   state->solves_told = state->engine.solves();
-  GstBuffer *first = state->shells.front(), *last = state->shells.back();
-  const GstClockTime timestamp = GST_BUFFER_PTS(first);
-  GstClockTime duration = GST_CLOCK_TIME_NONE;
-  if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
-      GST_BUFFER_PTS(last) >= timestamp)
-    duration = GST_BUFFER_PTS(last) - timestamp +
-               (GST_BUFFER_DURATION_IS_VALID(last) ? GST_BUFFER_DURATION(last) : 0);
-
-  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  {
-    const std::lock_guard lock(state->engine_lock);
-    state->background.solved(segment, timestamp, duration);
-  }
   GST_OBJECT_LOCK(self);
   const bool post = state->settings.post_messages;
   const Counters counters = state->counters;
   GST_OBJECT_UNLOCK(self);
-  if (post)
-    gst_element_post_message(
-        GST_ELEMENT(self),
-        gst_message_new_element(
-            GST_OBJECT(self),
-            make_solve_message(state->engine.report(), counters, segment, timestamp, duration)));
+  if (!post) return;
+  const FrameTime time = time_of_waiting(*state);
+  gst_element_post_message(
+      GST_ELEMENT(self), gst_message_new_element(
+                             GST_OBJECT(self), make_solve_message(state->engine.report(), counters,
+                                                                  GST_BASE_TRANSFORM(self)->segment,
+                                                                  time.timestamp, time.duration)));
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -191,6 +208,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
     if (!frame) {
       GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
+      drop_frames(self);
       return GST_FLOW_ERROR;
     }
     const bool written = with_engine(self, [&](Engine& engine) {
@@ -217,7 +235,12 @@ GstFlowReturn drain(GstQdmdBackground* self) {
   if (!state->engine.configured()) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
-  if (!with_engine(self, [](Engine& engine) { return engine.drain(); })) flow = GST_FLOW_ERROR;
+  const auto solve = [self](Engine& engine) {
+    const Status status = engine.drain();
+    note_solve(self);
+    return status;
+  };
+  if (!with_engine(self, solve)) flow = GST_FLOW_ERROR;
   if (flow == GST_FLOW_OK) tell_of_solve(self);
   while (flow == GST_FLOW_OK && state->engine.ready()) {
     GstBuffer* buffer = nullptr;
@@ -255,7 +278,7 @@ static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
   return has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
 }
 
-// Says once what somebody set and the method does not look at.
+// Warns once of each property that was set and has no effect with this method.
 static void warn_of_settings_without_effect(GstQdmdBackground* self, const Settings& settings) {
   for (const char* name : options_without_effect(settings.engine.method)) {
     const guint id = g_object_class_find_property(G_OBJECT_GET_CLASS(self), name)->param_id;
@@ -280,7 +303,10 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
-    if (status.ok()) state->shells.reserve(static_cast<size_t>(options.window_size));
+    if (status.ok())
+      state->shells.reserve(static_cast<size_t>(options.window_size));
+    else
+      engine.flush();
     return status;
   });
 }
@@ -331,7 +357,9 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_freeze(freeze);
       engine.set_threads(threads);
       engine.set_time_budget(budget / 1000);
-      return engine.push(state->io.read(frame));
+      const Status status = engine.push(state->io.read(frame));
+      note_solve(self);
+      return status;
     });
     if (!taken) {
       drop_frames(self);

@@ -24,8 +24,8 @@ struct State {
   bool reset_asked = false;
   SolveReport report;
 
-  // Held while the engine works, by the streaming thread and by who asks for the background; never
-  // while something is pushed, queried or posted. The object lock may be taken inside it.
+  // Held while the engine works, by the streaming thread and by a thread that reads `background`;
+  // never while something is pushed, queried or posted. The object lock may be taken inside it.
   std::mutex engine_lock;
   // Protected by the engine lock.
   Engine engine;
@@ -44,9 +44,11 @@ struct State {
 
 }  // namespace qdmd
 
+// What GLib aligns instances to.
+static_assert(alignof(qdmd::State) <= 16);
 struct _GstQdmdBackground {
   GstVideoFilter parent;
-  // In the instance's own memory, for which GLib answers.
+  // In the instance's own memory: GLib ends the process where it has none.
   qdmd::State* state;
   alignas(qdmd::State) unsigned char room_of_state[sizeof(qdmd::State)];
 };

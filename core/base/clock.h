@@ -43,7 +43,7 @@ class Clock {
   };
   // Since the clock was made.
   Spent spent() const;
-  // For work that was timed elsewhere.
+  // For work that was timed elsewhere, as tests do.
   void charge(Work work, double seconds);
 
   // Charges the time that it lives to one kind of work, less that of spans inside it on the same

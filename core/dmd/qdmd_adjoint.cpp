@@ -38,9 +38,9 @@ std::vector<Eigen::Index> standard_eigenvalues(const Eigen::VectorXcd& values) {
 }  // namespace
 
 double adjoint_bytes(double pixels, double snapshots) {
-  // Seven times the adjoint of X, 2n x 2(m - 1) complex doubles: itself, its copies inside the SVD,
-  // U, the check of it, and the modes. Measured.
-  return 7 * sizeof(std::complex<double>) * (2 * pixels) * (2 * std::max(snapshots - 1, 1.0));
+  // So many times the adjoint of X, 2n x 2(m - 1) complex doubles: itself, its copies inside the
+  // SVD, U, the check of it, and the modes. Measured.
+  return 7.4 * sizeof(std::complex<double>) * (2 * pixels) * (2 * std::max(snapshots - 1, 1.0));
 }
 
 BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& options) {

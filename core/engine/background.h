@@ -16,13 +16,13 @@ struct SolveReport : SolveFacts {
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
-// thread, one at a time; publish() then makes it the one in use. All else is for who uses that.
+// thread, one at a time; publish() then makes it the one in use. All other calls are about the one
+// in use.
 class Background {
  public:
   // Learnt anew with each solve; or held as it was; or held, but for the light of each frame.
   enum class State { learnt, held, held_in_light };
 
-  // keep_pictures: models outlive their window's frames.
   Background(std::unique_ptr<Learner> learner, const LearnerRoom& room);
 
   Learner& learner() { return *learner_; }

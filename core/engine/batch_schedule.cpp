@@ -35,12 +35,14 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
 void BatchSchedule::begin_window(bool freeze) {
   using State = Background::State;
   const bool solves = pace().next_stretch(&background());
-  // Whoever lets go of a background wants another.
+  // After a freeze, the next window is solved.
   if (freeze) pace().solve_next();
   if (!background().known()) return;
   const double last = frames().size() - 1;
   if (freeze || !solves) {
     background().hold(last, freeze ? State::held : State::held_in_light);
+    // Until the first of its frames is shown.
+    if (!freeze && frames().size() > 0) background().follow_light(frames().window().newest_slot());
   } else if (background().state() != State::learnt) {
     background().learn();
     // Frames that came meanwhile are in no Gram matrix.

@@ -24,7 +24,7 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  // Starts afresh with frames of width x height pixels.
+  // Starts afresh with frames of width x height pixels. Where it refuses, all is as it was.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
   // Gives all memory and threads back; configure() comes next.
@@ -39,8 +39,8 @@ class Engine {
   // Of the frame that pop() gives next, width * height samples each: its mask, as Output::mask has
   // it, and the lengths of its residuals in levels, at most 255. Call only while ready().
   void foreground(uint8_t* mask, uint8_t* residual);
-  // Writes the newest background. Batch: that of the last frame that was solved for; live: that of
-  // the newest frame. False: there is none yet.
+  // Writes the newest background: that of the last frame of a batch that was solved for, or of the
+  // frame with which a live model came; or the one that is held. False: there is none yet.
   bool write_background(const MutableImageView& out);
   // Makes every waiting frame ready. The frame after it belongs to a new window: time is broken.
   Status drain();
@@ -67,7 +67,8 @@ class Engine {
   // Where the caller charges what a frame takes beside push() and pop(), for instance to be
   // converted: it counts.
   Clock& clock() { return clock_; }
-  // As EngineOptions::threads. Takes effect with a frame that finds no solve under way.
+  // As EngineOptions::threads. Takes effect with a frame that finds no solve under way. More
+  // threads than configure() was told of take memory that max_memory does not know of.
   void set_threads(int threads);
 
  private:

@@ -32,6 +32,11 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   layout.frame_bytes =
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner->contents());
+  // Sums over more pixels than the Gram matrix can have may be any number.
+  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36) {
+    layout.bytes = UINT64_MAX;
+    return layout;
+  }
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, options.caller_bytes),
       learner->bytes(options.window_size, layout.capacity, live, Workers::count(options.threads)));
@@ -61,14 +66,17 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
-  const uint64_t solver = Learner::make(options, width, height)->solver_bytes(options.window_size);
+  const EngineLayout layout = layout_of(options, width, height);
+  const uint64_t solver =
+      layout.bytes == UINT64_MAX
+          ? 0
+          : Learner::make(options, width, height)->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
             "solver=adjoint with a window-size of " + describe(options, width, height) +
                 " needs about " + std::to_string(solver) + " bytes and max-memory allows " +
                 std::to_string(options.max_memory) +
                 ": use solver=gram, lower window-size, or scale the video down."};
-  const EngineLayout layout = layout_of(options, width, height);
   if (layout.bytes > options.max_memory)
     return {Code::too_much_memory,
             "A window-size of " + describe(options, width, height) + " needs " +

@@ -7,6 +7,7 @@
 #include "core/base/status.h"
 #include "core/engine/live_plan.h"
 #include "core/learn/method.h"
+#include "core/parallel/workers.h"
 
 namespace qdmd {
 
@@ -24,7 +25,7 @@ struct EngineOptions : LearnOptions {
   uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
 
-  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = 256;
+  static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;
 };
 
 // What options and frame size come to.

@@ -9,6 +9,7 @@ LiveSchedule::LiveSchedule(const Stage& stage, const LivePlan& plan)
 
 bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   const bool frozen = freeze && background().known();
+  const uint64_t solves = background().solves();
   if (frozen)
     pace().solve_next();
   else
@@ -24,6 +25,7 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (!frozen) begin_work();
   if (background().state() == Background::State::learnt)
     background().follow_light(frames().window().newest_slot());
+  if (background().solves() > solves) published_ = {time(), background().model().light()};
   pace().count_frame();
   queue->pending = queue->ready = 1;
   return true;
@@ -133,8 +135,17 @@ double LiveSchedule::time() const {
   return static_cast<double>(std::min<int64_t>(plan_.frames() - 1 - model_start_, last));
 }
 
-void LiveSchedule::show(int) { background().model().set_time(time()); }
+void LiveSchedule::show(int index) {
+  if (background().state() == Background::State::learnt)
+    background().follow_light(frames().slot(index));
+  background().model().set_time(time());
+}
 
-void LiveSchedule::show_newest() { show(0); }
+void LiveSchedule::show_newest() {
+  BackgroundModel& model = background().model();
+  if (background().state() == Background::State::learnt && background().learner().follows_light())
+    model.set_light(published_.light);
+  model.set_time(published_.time);
+}
 
 }  // namespace qdmd

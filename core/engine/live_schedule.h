@@ -37,9 +37,14 @@ class LiveSchedule : public Schedule {
     int64_t first_frame;
   };
 
+  // Of the newest frame.
+  struct Moment {
+    double time = 0;
+    Gain light = kSameLight;
+  };
+
   void settle();
   void begin_work();
-  void begin_piece(const LivePlan::Step& step, const SnapshotRange& span, bool at_once);
   void run(bool at_once);
   void work();
   void publish();
@@ -49,6 +54,7 @@ class LiveSchedule : public Schedule {
 
   LivePlan plan_;
   bool start_new_window_ = false;
+  Moment published_;         // when the model in use was published
   int64_t model_start_ = 0;  // the frame at time 0 of the model in use, counted like first_frame
   // The side thread's while it works.
   std::optional<Group> group_;

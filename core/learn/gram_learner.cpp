@@ -1,6 +1,6 @@
 #include "core/learn/gram_learner.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include "core/dmd/qdmd.h"
 #include "core/passes/sampling.h"

@@ -51,6 +51,8 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   for (int t = 0; t < snapshots.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
   const auto pictures = static_cast<size_t>(basis_.rows());
+  // Room for more pictures is made without the old ones beside it.
+  if (samples_.capacity() < pictures * pixels_) std::vector<float>().swap(samples_);
   direct_ = !keep_pictures &&
             pictures * sizeof(float) > static_cast<size_t>(kChannels * snapshots.size());
   make_pictures(direct_ ? 0 : pictures);

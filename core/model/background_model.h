@@ -35,6 +35,8 @@ class BackgroundModel {
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
   // For set_time() from now on, in place of the snapshots' gains.
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
+  // That one.
+  Gain light() const { return gains_.empty() ? kSameLight : gains_.front(); }
 
   // Of each pixel, in levels: what its residual must exceed to be foreground where nobody asks for
   // a threshold. Room for them, kept until begin().

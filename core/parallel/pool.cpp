@@ -61,7 +61,7 @@ void Pool::run_job(size_t parts, Job job) noexcept {
   for (size_t k = 0; k < helpers; ++k) wake_.notify_one();
   do_parts(job, parts, 0);
   std::unique_lock lock(mutex_);
-  // Who has not woken by now finds nothing to do: only those inside are waited for.
+  // A worker that has not woken by now finds nothing to do: only those inside are waited for.
   job_ = {};
   idle_.wait(lock, [this] { return busy_ == 0; });
 }

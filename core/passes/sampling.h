@@ -8,7 +8,7 @@ namespace qdmd {
 
 // How many there are along a side, and in a picture.
 constexpr size_t sample_count(int size, int step) {
-  return static_cast<size_t>((size + step - 1) / step);
+  return static_cast<size_t>((size - 1) / step + 1);
 }
 constexpr size_t sample_count(int width, int height, int step) {
   return sample_count(width, step) * sample_count(height, step);

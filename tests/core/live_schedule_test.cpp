@@ -51,7 +51,7 @@ struct Spread {
   std::vector<uint8_t> picture() {
     std::vector<uint8_t> out(3 * pixels);
     uint8_t* const rows[3] = {out.data(), out.data() + pixels, out.data() + 2 * pixels};
-    live.show_newest();
+    live.show(frames.size() - 1);
     background.model().evaluate(0, pixels, rows);
     return out;
   }

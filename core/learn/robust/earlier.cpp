@@ -17,6 +17,7 @@ Recollection Earlier::recollection(float most) const {
 void Earlier::take(const Grid& grid, const Reference& background,
                    const std::vector<uint8_t>& spread, const StableFrames& stable, int count,
                    float fresh) {
+  known_ = false;
   weight_.resize(grid.cells());
   for (size_t cell = 0; cell < grid.cells(); ++cell) {
     const std::span<const uint16_t> frames = stable.of_cell[cell];
@@ -30,6 +31,7 @@ void Earlier::take(const Grid& grid, const Reference& background,
     level_[c] = background.level[c];
     cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
   }
+  known_ = true;
 }
 
 }  // namespace qdmd

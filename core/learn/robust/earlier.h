@@ -6,15 +6,18 @@
 
 namespace qdmd {
 
-// Whoever stands still through a whole window is background there. Where the window before had seen
-// what is behind, its picture takes part in the next start like one more frame of some weight.
+// A person who stands still through a whole window is background there. Where the window before had
+// seen what is behind, its picture takes part in the next start like one more frame of some weight.
 class Earlier {
  public:
   Earlier() = default;
   explicit Earlier(const Grid& grid) : cells_(grid, 1) {}
 
-  bool known() const { return !weight_.empty(); }
-  void forget() { weight_.clear(); }
+  bool known() const { return known_; }
+  void forget() {
+    known_ = false;
+    weight_.clear();
+  }
 
   // The background's cells, in its window's unit light.
   const GridFrames& cells() const { return cells_; }
@@ -30,6 +33,7 @@ class Earlier {
             const StableFrames& stable, int count, float fresh);
 
  private:
+  bool known_ = false;  // set last: what follows is whole
   GridFrames cells_;
   std::vector<uint8_t> level_[kChannels], spread_;
   std::vector<float> weight_, limit_;  // by cells

@@ -49,6 +49,8 @@ size_t RobustLearner::samples_at(int step) const {
 uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
                               int threads) const {
   const auto workers = static_cast<uint64_t>(threads);
+  DmdOptions dmd = options_.dmd;
+  if (keep_pictures) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const uint64_t looks = static_cast<uint64_t>(std::min(window_size, parameters_.start_frames)) + 1;
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
@@ -58,17 +60,19 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
       StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
       PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
       SlidingGram::bytes(capacity, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
-  const uint64_t models = (keep_pictures ? 2 : 1) *
-                          (BackgroundModel::bytes(pixels(), window_size,
-                                                  most_pictures(options_.dmd, window_size), true) +
-                           pixels());
-  // One after another: what a start compares, masks, the decomposition, the combination.
+  const uint64_t models =
+      (keep_pictures ? 2 : 1) *
+      (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
+       pixels());
+  // One after another: what a start compares, with densities and then a spread; masks; the
+  // decomposition; the combination.
   const uint64_t start = GridFrames::bytes(grid_, window_size) +
-                         GridFrames::bytes(grid_, static_cast<int>(looks)) + levels(2 * looks);
+                         GridFrames::bytes(grid_, static_cast<int>(looks)) +
+                         std::max<uint64_t>(levels(2 * looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
   return kept + models +
-         std::max({start, pixels(), masks,
+         std::max({start, masks,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
                                        window_size),
                    filling});
@@ -174,7 +178,7 @@ void RobustLearner::recall_spread(std::vector<uint8_t>* spread) const {
 }
 
 void RobustLearner::find_foreground(const SnapshotRange& snapshots) {
-  // Before the threads begin, who must not run out of memory.
+  // Taken here: tasks of the pool take no memory.
   const size_t scratch_size = mask_scratch_bytes(reference_.width, reference_.height);
   const auto scratch =
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * room_.pool->threads());
