@@ -2,7 +2,7 @@
 // engine can be used again, loses no frame and no memory.
 //
 // Short: few cases, and of their allocations the first of each place in the code.
-//   QDMD_LONG=1      every allocation, in each method, solver, mode and output: half an hour
+//   QDMD_LONG=1      every allocation, in each method, solver, mode and output: some hours
 //   QDMD_SHOW_OOM=1  what was tried, case by case
 #include <array>
 #include <csignal>
