@@ -153,7 +153,7 @@ TEST(LivePlan, ASlicedGroupIsOverBeforeTheNext) {
   });
 }
 
-// LiveSolver's order of work: in each frame first a slice of pictures, then a slice of products;
+// LiveSchedule's order of work: in each frame first a slice of pictures, then a slice of products;
 // the decomposition comes with the last of these.
 TEST(LivePlan, PicturesAreOverBeforeTheNextDecomposition) {
   for_every_setting([](const Setting& setting) {
