@@ -154,9 +154,11 @@ void check_all(Method method, Solver solver, std::initializer_list<Size> sizes) 
 }
 
 TEST(Memory, OfTheDefault) {
-  check_all(Method::robust, Solver::gram, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
+  check_all(Method::robust, Solver::gram,
+            {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}, {100, 80, 30}, {200, 150, 60}});
 }
 
+// At the sizes at which decomposition_bytes() was measured.
 TEST(Memory, OfQdmd) {
   check_all(Method::qdmd, Solver::gram, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
   check_all(Method::qdmd, Solver::gram_extended, {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}});
