@@ -1,18 +1,15 @@
 // Every allocation of an engine fails once: the caller gets std::bad_alloc or a Status, and the
 // engine can be used again, loses no frame and no memory.
 //
-// Short: few cases, and of their allocations the first of each place in the code.
-//   QDMD_LONG=1      every allocation, in each method, solver, mode and output: some hours
-//   QDMD_SHOW_OOM=1  what was tried, case by case
+// Short: few cases; QDMD_LONG=1: every allocation, in each method, solver, mode and output, about
+// half an hour. GTEST_TOTAL_SHARDS and GTEST_SHARD_INDEX share the cases out.
 #include <array>
+#include <cctype>
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
 #include <new>
 #include <optional>
-#include <set>
 
-#include "tests/core/allocator.h"
+#include "tests/core/allocator_trials.h"
 #include "tests/core/engine_util.h"
 #include "tests/core/solver_names.h"
 
@@ -32,10 +29,7 @@ struct Case {
   Alpha alpha = Alpha::none;
 };
 
-bool asked_for(const char* name) { return std::getenv(name) != nullptr; }
-
-const bool kLong = asked_for("QDMD_LONG");
-constexpr int kWidth = 36, kHeight = 26, kSmallWidth = 30, kSmallHeight = 24;
+constexpr int kWidth = 24, kHeight = 18, kSmallWidth = 20, kSmallHeight = 16;
 constexpr int kWindow = 6, kHop = 2;
 
 EngineOptions options_of(const Case& c) {
@@ -68,7 +62,7 @@ std::vector<Picture> make_frames(Alpha alpha, int width, int height) {
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const auto p = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
-        const bool moves = (x - 5 * t + 200) % width < 9 && y > 8 && y < 20;
+        const bool moves = (x - 4 * t + 200) % width < 6 && y > 5 && y < 14;
         for (int k = 0; k < 3; ++k) {
           const int level = (60 + (7 * x + 3 * y + 11 * k) % 80) * (100 + 4 * (t % 4)) / 100;
           frames.back().at(static_cast<size_t>(k), p) =
@@ -299,19 +293,8 @@ struct Trial {
   Failing failing;
 };
 
-// Says what was tried where the process ends in the middle.
-std::string trial_name;
-void report_end(int signal) {
-  allocator::stop();
-  std::signal(signal, SIG_DFL);
-  std::fprintf(stderr, "ended: %s; what failed:\n", trial_name.c_str());
-  allocator::print_failed();
-  std::raise(signal);
-}
-
 std::string describe(const Trial& trial) {
-  return describe(trial.c) + ", " + trial.part.name + ", allocation " + std::to_string(trial.n) +
-         (trial.failing == Failing::one ? "" : " and all after it");
+  return describe(trial.c) + ", " + trial.part.name + trial_suffix(trial.n, trial.failing);
 }
 
 // Lets allocation n of the part's work fail; 0: none. Returns how many allocations it had, or none
@@ -319,8 +302,8 @@ std::string describe(const Trial& trial) {
 std::optional<int64_t> run(const Trial& trial, const std::vector<std::vector<uint8_t>>& right,
                            bool note_places = false) {
   const allocator::Unseen unseen;
-  trial_name = describe(trial);
-  SCOPED_TRACE(trial_name);
+  trial_name() = describe(trial);
+  SCOPED_TRACE(trial_name());
   std::optional<int64_t> allocations;
   allocator::Seen seen;
   {
@@ -381,8 +364,7 @@ std::optional<int64_t> run(const Trial& trial, const std::vector<std::vector<uin
   return allocations;
 }
 
-// Every allocation, or the first of each place in the code that was not tried before.
-void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
+void check(const Case& c) {
   const auto right = [&] {
     Engine engine;
     Owner owner(c, &engine);
@@ -393,32 +375,25 @@ void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
   for (const Part& part : kParts) {
     const auto all = run({c, part, 0, Failing::one}, right, true);
     ASSERT_TRUE(all.has_value());
-    std::vector<int64_t> numbers;
     int64_t last = *all;
     // Eigen's SVD frees twice what it has where memory runs out in it. The solver sees first
     // whether there is enough; what comes after that allocation cannot be tried.
     if (c.solver == Solver::adjoint)
       if (const int64_t foreseen = allocator::first_of(350 * kSmallWidth * kSmallHeight))
         last = foreseen;
-    for (int64_t n = 1; n <= last; ++n)
-      if (tried->insert(allocator::place(n)).second) numbers.push_back(n);
-    if (asked_for("QDMD_SHOW_OOM")) {
-      std::printf("%s, %s: %ld allocations, %zu new places\n", describe(c).c_str(), part.name,
-                  static_cast<long>(*all), numbers.size());
-      std::fflush(stdout);
-    }
-    for (int64_t n : numbers)
-      run({c, part, n, every || n % 3 == 0 ? Failing::all : Failing::one}, right);
-    for (int64_t n = 1; every && n <= last && !testing::Test::HasFailure(); ++n)
-      run({c, part, n, Failing::one}, right);
-    if (testing::Test::HasFailure()) return;
+    // The outputs differ only in what they write.
+    for (int64_t n : allocations_to_try(part.name, last))
+      for (Failing failing : ways_to_fail(n, c.output == Output::mask)) {
+        run({c, part, n, failing}, right);
+        if (testing::Test::HasFailure()) return;
+      }
   }
 }
 
-class OutOfMemory : public testing::Test {
+class OutOfMemory : public testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
-    for (int signal : {SIGABRT, SIGSEGV}) std::signal(signal, report_end);
+    for (int signal : {SIGABRT, SIGSEGV}) std::signal(signal, report_trial);
     // The C library keeps what it allocates for a thread when it ends.
     std::vector<std::thread> threads;
     for (int i = 0; i < 5; ++i)
@@ -427,34 +402,36 @@ class OutOfMemory : public testing::Test {
   }
 };
 
-void check_all(std::initializer_list<Method> methods, std::initializer_list<Solver> solvers) {
-  int number = 0;
-  std::set<uint64_t> tried;
-  for (Method method : methods)
-    for (Solver solver : solvers)
-      for (Mode mode : {Mode::batch, Mode::live}) {
-        if (!kLong) {
-          // Each output, alpha and number of threads somewhere.
-          const int k = number++;
-          check({method, solver, mode, static_cast<Output>(k % 4), k % 2 == 0 ? 1 : 3,
-                 static_cast<Alpha>((k + 2) % 3)},
-                &tried);
-          continue;
-        }
-        for (int k = 0; k < 4; ++k) {
-          std::set<uint64_t> none;
-          check({method, solver, mode, static_cast<Output>(k), k % 2 == 0 ? 3 : 1,
-                 static_cast<Alpha>(k % 3)},
-                &none, true);
-        }
+// Short: each output, alpha and number of threads somewhere.
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  const auto add = [&all](Method method, Solver solver) {
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (int k = 0; k < (kLongTrials ? 4 : 1); ++k) {
+        const auto i = kLongTrials ? k : static_cast<int>(all.size());
+        all.push_back({method, solver, mode, static_cast<Output>(i % 4), i % 2 == 0 ? 1 : 3,
+                       static_cast<Alpha>((i + 2) % 3)});
       }
+  };
+  add(Method::robust, Solver::gram);
+  for (Solver solver : {Solver::gram, Solver::gram_extended, Solver::qr, Solver::adjoint})
+    add(Method::qdmd, solver);
+  add(Method::dmd, Solver::gram);
+  return all;
 }
 
-TEST_F(OutOfMemory, Default) { check_all({Method::robust}, {Solver::gram}); }
-TEST_F(OutOfMemory, Qdmd) {
-  check_all({Method::qdmd}, {Solver::gram, Solver::gram_extended, Solver::qr, Solver::adjoint});
+TEST_P(OutOfMemory, LeavesAnEngineThatCanGoOn) { check(GetParam()); }
+
+std::string test_name(const testing::TestParamInfo<Case>& info) {
+  std::string name = describe(info.param);
+  for (size_t i = 0; i < name.size(); ++i) {
+    if (name[i] == ',') name.erase(i, 1);
+    if (!std::isalnum(static_cast<unsigned char>(name[i]))) name[i] = '_';
+  }
+  return name;
 }
-TEST_F(OutOfMemory, Dmd) { check_all({Method::dmd}, {Solver::gram}); }
+
+INSTANTIATE_TEST_SUITE_P(Engine, OutOfMemory, testing::ValuesIn(cases()), test_name);
 
 }  // namespace
 }  // namespace qdmd::test

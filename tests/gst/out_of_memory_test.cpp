@@ -2,17 +2,15 @@
 // its frames, and the element can be used again. What GLib and GStreamer allocate does not fail:
 // GLib ends the process where there is no memory.
 //
-// Short: few cases, and of their allocations the first of each place in the code.
-//   QDMD_LONG=1      all cases so, and of each method and mode one with every allocation: hours
-//   QDMD_SHOW_OOM=1  what was tried, case by case
+// Short: the first of each place in the code; QDMD_LONG=1: every one.
+// GTEST_TOTAL_SHARDS and GTEST_SHARD_INDEX share the cases out.
 #include <array>
+#include <cctype>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
-#include <set>
 
-#include "tests/core/allocator.h"
+#include "tests/core/allocator_trials.h"
 #include "tests/gst/element_test.h"
 
 namespace qdmd::test {
@@ -20,10 +18,7 @@ namespace {
 
 using allocator::Failing;
 
-bool asked_for(const char* name) { return std::getenv(name) != nullptr; }
-
-const bool kLong = asked_for("QDMD_LONG");
-constexpr int kWindow = 6, kWidth = 40, kHeight = 26, kSmallWidth = 32, kSmallHeight = 24;
+constexpr int kWindow = 6, kWidth = 24, kHeight = 18, kSmallWidth = 20, kSmallHeight = 16;
 
 struct Case {
   const char* properties;
@@ -235,23 +230,12 @@ struct Trial {
   Failing failing;
 };
 
-// Says what was tried where the process ends in the middle.
-std::string trial_name;
-void report_end(int signal) {
-  allocator::stop();
-  std::signal(signal, SIG_DFL);
-  std::fprintf(stderr, "ended: %s; what failed:\n", trial_name.c_str());
-  allocator::print_failed();
-  std::raise(signal);
-}
-
 // How many allocations the part's work had; fewer than n: none failed.
 int64_t run(const Trial& trial, const std::vector<std::vector<uint8_t>>& right,
             bool note_places = false) {
   const allocator::Unseen unseen;
-  trial_name = describe(trial.c) + ", " + trial.part.name + ", allocation " +
-               std::to_string(trial.n) + (trial.failing == Failing::one ? "" : " and all after it");
-  SCOPED_TRACE(trial_name);
+  trial_name() = describe(trial.c) + ", " + trial.part.name + trial_suffix(trial.n, trial.failing);
+  SCOPED_TRACE(trial_name());
   allocator::start();
   int64_t allocations = 0;
   {
@@ -288,7 +272,7 @@ int64_t run(const Trial& trial, const std::vector<std::vector<uint8_t>>& right,
   return allocations;
 }
 
-void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
+void check(const Case& c) {
   const auto right = [&] {
     Application app(c);
     return pictures_of(app);
@@ -296,70 +280,63 @@ void check(const Case& c, std::set<uint64_t>* tried, bool every = false) {
   EXPECT_EQ(right.size(), static_cast<size_t>(kWindow + kWindow / 2));
   for (const Part& part : kParts) {
     const int64_t all = run({c, part, 0, Failing::one}, right, true);
-    std::vector<int64_t> numbers;
-    for (int64_t n = 1; n <= all; ++n)
-      if (tried->insert(allocator::place(n)).second) numbers.push_back(n);
-    if (asked_for("QDMD_SHOW_OOM")) {
-      std::printf("%s, %s: %ld allocations, %zu new places\n", describe(c).c_str(), part.name,
-                  static_cast<long>(all), numbers.size());
-      std::fflush(stdout);
-    }
-    if (every) {
-      for (Failing failing : {Failing::one, Failing::all})
-        for (int64_t n = 1; run({c, part, n, failing}, right) >= n; ++n)
-          if (testing::Test::HasFailure()) return;
-    } else {
-      for (int64_t n : numbers) run({c, part, n, n % 3 == 0 ? Failing::all : Failing::one}, right);
-    }
-    if (testing::Test::HasFailure()) return;
+    for (int64_t n : allocations_to_try(part.name, all))
+      for (Failing failing : ways_to_fail(n, std::string(c.output) == "mask")) {
+        run({c, part, n, failing}, right);
+        if (testing::Test::HasFailure()) return;
+      }
   }
 }
 
-class OutOfMemory : public testing::Test {
+// Its code must be there to be told from others'.
+void look_at_the_element() {
+  GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
+  ASSERT_NE(nullptr, element);
+  gst_object_unref(element);
+  ASSERT_TRUE(allocator::see_only("libgstqdmd.so"));
+  for (int signal : {SIGABRT, SIGSEGV, SIGTRAP}) std::signal(signal, report_trial);
+}
+
+class OutOfMemory : public testing::TestWithParam<Case> {
  protected:
-  void SetUp() override {
-    // Its code must be there to be told from others'.
-    GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
-    ASSERT_NE(nullptr, element);
-    gst_object_unref(element);
-    ASSERT_TRUE(allocator::see_only("libgstqdmd.so"));
-    for (int signal : {SIGABRT, SIGSEGV, SIGTRAP}) std::signal(signal, report_end);
-  }
+  void SetUp() override { look_at_the_element(); }
 };
 
 constexpr std::array kFormats = {GST_VIDEO_FORMAT_RGB, GST_VIDEO_FORMAT_RGBA, GST_VIDEO_FORMAT_I420,
                                  GST_VIDEO_FORMAT_GRAY8};
 constexpr std::array kOutputs = {"background", "foreground", "mask", "cutout"};
 
-void check_all(std::initializer_list<const char*> properties) {
-  std::set<uint64_t> tried;
-  size_t number = 0;
-  for (const char* p : properties)
-    for (size_t f = 0; f < kFormats.size(); ++f) {
-      ++number;
-      if (!kLong) {
-        check({p, kFormats[f], kOutputs[number % 4], number % 2 == 0 ? 1 : 3}, &tried);
-        continue;
-      }
-      for (const char* output : kOutputs)
-        for (int threads : {1, 3}) {
-          std::set<uint64_t> none;
-          check({p, kFormats[f], output, threads}, &none, f == 0 && output == kOutputs[0]);
-        }
-    }
+// Each output with each method and mode, and each format with each output.
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  size_t turn = 0;
+  for (const char* properties :
+       {"mode=batch", "mode=live", "mode=batch method=qdmd", "mode=live method=qdmd",
+        "mode=batch method=dmd", "mode=live method=dmd"}) {
+    for (size_t k = 0; k < kFormats.size(); ++k)
+      all.push_back({properties, kFormats[k], kOutputs[(k + turn) % 4], k % 2 == 0 ? 3 : 1});
+    ++turn;
+  }
+  return all;
 }
 
-TEST_F(OutOfMemory, Default) { check_all({"mode=batch", "mode=live"}); }
-TEST_F(OutOfMemory, OtherMethods) {
-  check_all({"mode=batch method=qdmd", "mode=live method=qdmd", "mode=batch method=dmd",
-             "mode=live method=dmd"});
-}
+TEST_P(OutOfMemory, LeavesAnElementThatCanGoOn) { check(GetParam()); }
 
-TEST_F(OutOfMemory, OfAnElementInTheMaking) {
+INSTANTIATE_TEST_SUITE_P(Element, OutOfMemory, testing::ValuesIn(cases()),
+                         [](const auto& instance) {
+                           std::string name =
+                               std::string(instance.param.properties) + " " + instance.param.output;
+                           for (char& c : name)
+                             if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                           return name + "_" + gst_video_format_to_string(instance.param.format);
+                         });
+
+TEST(OutOfMemoryOfANewElement, LeavesNothing) {
+  look_at_the_element();
   for (int64_t n = 1;; ++n) {
     allocator::start();
     allocator::fail(n, Failing::one);
-    trial_name = "a new element, allocation " + std::to_string(n);
+    trial_name() = "a new element, allocation " + std::to_string(n);
     GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
     allocator::stop();
     if (element) gst_object_unref(element);
