@@ -1,6 +1,7 @@
 #include "core/dmd/decompose.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/dmd/channel_dmd.h"
 #include "core/dmd/qdmd.h"
@@ -34,8 +35,9 @@ Decomposition single_snapshot() {
 
 }  // namespace
 
-BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
+BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
                                  const DmdOptions& options) {
+  if (options.solver == Solver::qr || options.solver == Solver::adjoint) gram.resize(0, 0);
   switch (options.solver) {
     case Solver::qr:
       return qdmd_from_qr(snapshots, options);
@@ -45,15 +47,18 @@ BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMa
     case Solver::gram_extended:
       break;
   }
-  return qdmd_from_gram(quaternion_gram(gram), options);
+  QuaternionMatrixd g = quaternion_gram(gram);
+  gram.resize(0, 0);
+  return qdmd_from_gram(std::move(g), options);
 }
 
-Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
+Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
                         const DmdOptions& options) {
-  if (gram.rows() == kChannels) return single_snapshot();
-  const BackgroundModes modes = quaternion_modes(snapshots, gram, options);
+  const auto m = static_cast<int>(gram.rows() / kChannels);
+  if (m == 1) return single_snapshot();
+  const BackgroundModes modes = quaternion_modes(snapshots, std::move(gram), options);
   Decomposition result;
-  result.background = TemporalModel(static_cast<int>(gram.rows() / kChannels));
+  result.background = TemporalModel(m);
   for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)
     result.background.add_mode(modes.combination.col(p), modes.eigenvalues(p),
                                modes.reference_times(p), modes.amplitudes.get(p, 0));
@@ -100,32 +105,55 @@ int most_channel_pictures(const DmdOptions& options, int snapshots) {
   return kChannels * 2 * modes;
 }
 
-uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snapshots) {
-  const double m = snapshots, integers = kChannels * kChannels * sizeof(int64_t) * m * m;
-  // Eigen has temporary matrices below this on the stack.
-  const bool heap = sizeof(std::complex<double>) * m * m > EIGEN_STACK_ALLOCATION_LIMIT;
-  double beside = 0;
-  switch (options.solver) {
-    case Solver::gram:
-      beside = (heap ? 144 : 112) * m * m;
-      break;
-    case Solver::gram_extended:
-      beside = 208 * m * m;
-      break;
-    case Solver::qr:
-      // A block of rows, twice.
-      beside = 2 * sizeof(Quaterniond) * (std::max(512.0, 2 * m) + m) * m + 55 * m * m;
-      break;
-    case Solver::adjoint:
-      beside = adjoint_bytes(pixels, m);
-      break;
-  }
-  return static_cast<uint64_t>(integers + beside);
+namespace {
+
+// How many m x m matrices are alive at once where most are, the snapshot factor R included.
+double most_matrices(const DmdOptions& options) {
+  const bool extended = options.solver == Solver::gram_extended;
+  // The amplitudes of all modes at once, by Eigen on the complex adjoint.
+  if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14;
+  // Singular values: from a Hermitian matrix's eigenvectors, or without squaring.
+  if (options.rank > 0) return options.solver == Solver::gram ? 8 : 10.7;
+  // G and its factor in double-double; the right-hand side of first_frame beside the pencil.
+  if (extended || options.amplitude == Amplitude::first_frame) return 8;
+  // R, the pencil H and R11 twice, H - R11 twice.
+  return 7;
 }
 
-uint64_t channel_decomposition_bytes(int snapshots) {
-  const auto m = static_cast<uint64_t>(snapshots);
-  return 116 * m * m;
+}  // namespace
+
+uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snapshots) {
+  const double m = snapshots, matrix = sizeof(Quaterniond) * m * m;
+  // The space of Arnoldi's method.
+  constexpr double kSpace = 8 << 10;
+  const double reduced = most_matrices(options) * matrix + kSpace;
+  switch (options.solver) {
+    case Solver::gram:
+    case Solver::gram_extended:
+      break;
+    case Solver::qr: {
+      // A block of rows below R, as many reflectors less their triangle, and R of the block.
+      const double rows = std::max(512.0, 2 * m) + m;
+      return static_cast<uint64_t>(
+          std::max(2 * sizeof(Quaterniond) * rows * m + 1.5 * matrix, reduced));
+    }
+    case Solver::adjoint:
+      return static_cast<uint64_t>(adjoint_bytes(pixels, m));
+  }
+  return static_cast<uint64_t>(reduced);
+}
+
+uint64_t channel_decomposition_bytes(const DmdOptions& options, int snapshots) {
+  const double m = snapshots;
+  // Eigen has temporary matrices below this on the stack.
+  const bool heap = sizeof(std::complex<double>) * m * m > EIGEN_STACK_ALLOCATION_LIMIT;
+  // The Gram matrix has nine such parts, a channel's eigenvectors four; what comes then goes with
+  // the rank.
+  double matrices = options.amplitude == Amplitude::first_frame ? 33.5 : heap ? 28 : 25.2;
+  if (options.rank > 0) matrices = std::min(matrices, 13.5 + (matrices - 13.5) * options.rank / m);
+  const double modes = options.omega_threshold > 0 ? 2 * most_modes(options, snapshots) : 2;
+  return static_cast<uint64_t>(sizeof(double) * matrices * m * m +
+                               6 * sizeof(std::complex<double>) * modes * m);
 }
 
 }  // namespace qdmd

@@ -13,13 +13,13 @@ struct Decomposition {
 };
 
 // Q-DMD of the window by the solver that `options` names; arguments as below.
-BackgroundModes quaternion_modes(const SnapshotRange& snapshots, const IntegerMatrix& gram,
+BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
                                  const DmdOptions& options);
 
 // Q-DMD (the paper's Algorithm 2). `gram` is the exact Gram matrix of `snapshots` in time order
 // (3m x 3m). The pixels are read by Solver::qr and Solver::adjoint only. m >= 1; a single snapshot
 // is its own background.
-Decomposition decompose(const SnapshotRange& snapshots, const IntegerMatrix& gram,
+Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
                         const DmdOptions& options);
 
 // Exact DMD of each channel by itself (the paper's Algorithm 1); options.solver is not looked at.
@@ -29,9 +29,10 @@ Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& op
 int most_pictures(const DmdOptions& options, int snapshots);
 int most_channel_pictures(const DmdOptions& options, int snapshots);
 
-// About the bytes that the two take while they run, `gram` included: multiples of m^2 and n m for n
-// pixels, measured at m = 12, 50 and 100. At other m they can be off by a third or 0.2 MB.
+// The most bytes that the two take while they run, `gram` included, for n = `pixels` and m =
+// `snapshots` that are linearly independent, as a camera's noise makes them. Fewer of these take
+// less. The channels' modes and Solver::adjoint: about.
 uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snapshots);
-uint64_t channel_decomposition_bytes(int snapshots);
+uint64_t channel_decomposition_bytes(const DmdOptions& options, int snapshots);
 
 }  // namespace qdmd

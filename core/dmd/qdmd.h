@@ -10,7 +10,7 @@ namespace qdmd {
 // Solver::gram and Solver::gram_extended. The Gram matrix squares singular values: those below
 // sqrt(4 m epsilon) of the largest count as zero. Factorized in double-double it does not matter,
 // and the limit is 4 m epsilon. m = 0 or 1, and X = 0, have no mode (P = 0).
-BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& options);
+BackgroundModes qdmd_from_gram(QuaternionMatrixd g, const DmdOptions& options);
 
 // From the triangular factor of a Householder QR factorization of the pixel columns, in double:
 // the Gram matrix is not used. Time grows with n m^2, at many times the cost of the Gram matrix;

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "core/dmd/qdmd.h"
 #include "core/dmd/reduced_qdmd.h"
 #include "core/quaternion/double_double.h"
@@ -14,12 +16,15 @@ QuaternionMatrix<To> cast(const QuaternionMatrix<From>& m) {
 }
 
 // R in double-double, rounded at the end: as good as a QR factorization of the pixels.
-SnapshotFactor<double> factorize_gram_extended(const QuaternionMatrixd& g) {
-  const auto extended = factorize_gram(cast<DoubleDouble>(g));
+SnapshotFactor<double> factorize_gram_extended(QuaternionMatrixd g) {
+  const auto exact = cast<DoubleDouble>(g);
+  const Eigen::Index m = g.rows();
+  g = {};  // memory for what comes
+  const auto extended = factorize_gram(exact);
   SnapshotFactor<double> factor;
   factor.r = cast<double>(extended.r);
   factor.triangular = extended.triangular;
-  factor.tolerance = gram_tolerance(g.rows());
+  factor.tolerance = gram_tolerance(m);
   return factor;
 }
 
@@ -27,10 +32,12 @@ SnapshotFactor<double> factorize_gram_extended(const QuaternionMatrixd& g) {
 
 template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&, const DmdOptions&);
 
-BackgroundModes qdmd_from_gram(const QuaternionMatrixd& g, const DmdOptions& options) {
-  return reduced_qdmd(
-      options.solver == Solver::gram_extended ? factorize_gram_extended(g) : factorize_gram(g),
-      options);
+BackgroundModes qdmd_from_gram(QuaternionMatrixd g, const DmdOptions& options) {
+  if (options.solver == Solver::gram_extended)
+    return reduced_qdmd(factorize_gram_extended(std::move(g)), options);
+  const auto factor = factorize_gram(g);
+  g = {};
+  return reduced_qdmd(factor, options);
 }
 
 }  // namespace qdmd

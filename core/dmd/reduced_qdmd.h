@@ -167,16 +167,19 @@ template <typename Real>
 std::optional<QuaternionModes<Real>> full_rank_modes(const SnapshotFactor<Real>& factor,
                                                      const DmdOptions& options) {
   const Eigen::Index past = factor.r.cols() - 1;
-  const auto r11 = factor.r.block(0, 0, past, past), h = factor.r.block(0, 1, past, past);
+  auto r11 = factor.r.block(0, 0, past, past);
   const Real condition = condition_estimate(ScalarGrid<Real>(r11));
   if (!(condition * factor.tolerance < Real(1))) return std::nullopt;
+  auto h = factor.r.block(0, 1, past, past);
   std::optional<QuaternionModes<Real>> result;
   if (!(options.omega_threshold > 0))
     result = nearest_mode_of_pencil(h, r11, factor, options.amplitude);
   if (!result) {
     Projection<Real> projection;
     projection.coefficients = solve_upper(r11, QuaternionMatrix<Real>::identity(past));
+    r11 = {};  // memory for what comes
     projection.q_tilde = h * projection.coefficients;
+    h = {};
     result = modes_from_schur_form(projection, factor, options);
   }
   if (!result || !result->combination.all_finite() || !result->amplitudes.all_finite())

@@ -33,7 +33,7 @@ uint64_t GramLearner::bytes(int window_size, int capacity, bool keep_pictures, i
                                                       : most_pictures(dmd, window_size);
   const double seen = static_cast<double>(sample_count(width_, height_, step_));
   return SlidingGram::bytes(capacity, threads) +
-         (options_.method == Method::dmd ? channel_decomposition_bytes(window_size)
+         (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
          (keep_pictures ? 2 : 1) *
              BackgroundModel::bytes(pixels, window_size, pictures, keep_pictures);

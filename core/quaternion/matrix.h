@@ -133,10 +133,12 @@ class QuaternionMatrix {
     return *this;
   }
   friend QuaternionMatrix operator+(QuaternionMatrix p, const QuaternionMatrix& q) {
-    return p += q;
+    p += q;
+    return p;
   }
   friend QuaternionMatrix operator-(QuaternionMatrix p, const QuaternionMatrix& q) {
-    return p -= q;
+    p -= q;
+    return p;
   }
   friend QuaternionMatrix operator*(const QuaternionMatrix& p, const QuaternionMatrix& q) {
     eigen_assert(p.cols() == q.rows());

@@ -49,10 +49,13 @@ SchurForm<Real> schur(QuaternionMatrix<Real> m) {
   SchurForm<Real> form;
   // By a power of two, which rounds nothing: shift polynomials square the entries.
   const int exponent = m.normalize();
-  const auto hessenberg_basis = reduce_to_hessenberg(m);
+  auto hessenberg_basis = reduce_to_hessenberg(m);
   ScalarGrid<Real> h(m), q(hessenberg_basis);
   const Real epsilon = std::numeric_limits<Real>::epsilon();
   const Real scale = m.norm();
+  // Memory for the results.
+  m = {};
+  hessenberg_basis = {};
 
   constexpr int kIterationsPerEigenvalue = 60, kPatience = 12;
   int iterations = 0;
