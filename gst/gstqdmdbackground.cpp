@@ -45,9 +45,6 @@ namespace {
 
 using qdmd::Settings;
 
-// The latency of video without a frame rate is that of this rate.
-constexpr int kAssumedRate = 25;
-
 constexpr guint kStatsProperty = qdmd::kFirstFreeProperty,
                 kBackgroundProperty = qdmd::kFirstFreeProperty + 1;
 
@@ -68,10 +65,22 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
   qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
+  GValue before = G_VALUE_INIT;
+  g_value_init(&before, G_PARAM_SPEC_VALUE_TYPE(spec));
   GST_OBJECT_LOCK(object);
+  qdmd::get_setting(state->settings, id, &before);
   const bool known = qdmd::set_setting(&state->settings, id, value);
+  const bool running = GST_STATE(object) > GST_STATE_READY;
   GST_OBJECT_UNLOCK(object);
+  const bool changed = known && g_param_values_cmp(spec, &before, value) != 0;
+  g_value_unset(&before);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  if (changed && running && (spec->flags & GST_PARAM_MUTABLE_READY))
+    GST_ELEMENT_WARNING(object, LIBRARY, SETTINGS,
+                        ("%s takes effect with the next caps, or when the element starts again "
+                         "from READY: until then nothing changes.",
+                         spec->name),
+                        (nullptr));
 }
 
 static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* value,
@@ -131,17 +140,19 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps* ca
   const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
 
+  if (GST_VIDEO_INFO_IS_INTERLACED(in)) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("Interlaced video has two pictures in a frame: put deinterlace before "
+                       "qdmdbackground."),
+                      (nullptr));
+    return FALSE;
+  }
   if (!qdmd::configure(self, settings, *in, caps)) return FALSE;
 
-  const bool has_rate = GST_VIDEO_INFO_FPS_N(in) > 0 && GST_VIDEO_INFO_FPS_D(in) > 0;
-  const guint64 rate_n = has_rate ? guint64(GST_VIDEO_INFO_FPS_N(in)) : kAssumedRate;
-  const guint64 rate_d = has_rate ? guint64(GST_VIDEO_INFO_FPS_D(in)) : 1;
-  const guint64 delay =
-      settings.engine.mode == qdmd::Mode::live ? 0 : guint64(settings.engine.window_size - 1);
-  const GstClockTime latency = gst_util_uint64_scale(delay * GST_SECOND, rate_d, rate_n);
   GST_OBJECT_LOCK(self);
-  const bool changed = latency != state->latency;
-  state->latency = latency;
+  const bool changed = state->latency.configure(guint64(state->engine.delay()),
+                                                GST_VIDEO_INFO_FPS_N(in), GST_VIDEO_INFO_FPS_D(in));
+  const GstClockTime latency = state->latency.promised();
   GST_OBJECT_UNLOCK(self);
   GST_INFO_OBJECT(self, "windows of %d frames, latency %" GST_TIME_FORMAT,
                   settings.engine.window_size, GST_TIME_ARGS(latency));
@@ -195,7 +206,7 @@ static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirecti
   GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
   gst_query_parse_latency(query, &live, &min, &max);
   GST_OBJECT_LOCK(self);
-  const GstClockTime own = self->state->latency;
+  const GstClockTime own = self->state->latency.promised();
   GST_OBJECT_UNLOCK(self);
   min += own;
   if (GST_CLOCK_TIME_IS_VALID(max)) max += own;

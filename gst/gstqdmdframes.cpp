@@ -1,5 +1,6 @@
 #include "gst/gstqdmdframes.h"
 
+#include <algorithm>
 #include <exception>
 #include <new>
 #include <utility>
@@ -97,21 +98,24 @@ static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 f
   GST_OBJECT_LOCK(self);
   state->counters.frames_in += frames_in;
   state->counters.frames_out += frames_out;
-  state->counters.solves = engine.solves();
   state->counters.solve_period = guint(engine.time_budget().effort().period);
   state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
   state->report = engine.report();
   GST_OBJECT_UNLOCK(self);
 }
 
-// The time of the frames that wait: those that come out with a new solve.
+// The time of the frames that leave with the newest solve: `leaving`, if there is one, and those of
+// them that wait.
 struct FrameTime {
   GstClockTime timestamp = GST_CLOCK_TIME_NONE, duration = GST_CLOCK_TIME_NONE;
 };
-static FrameTime time_of_waiting(const State& state) {
+static FrameTime time_of_solve(const State& state, GstBuffer* leaving) {
   FrameTime time;
-  if (state.shells.empty()) return time;
-  GstBuffer *first = state.shells.front(), *last = state.shells.back();
+  const auto waiting =
+      std::min(static_cast<size_t>(state.engine.frames_left()), state.shells.size());
+  GstBuffer* first = leaving ? leaving : waiting > 0 ? state.shells.at(0) : nullptr;
+  if (!first) return time;
+  GstBuffer* last = waiting > 0 ? state.shells.at(waiting - 1) : first;
   time.timestamp = GST_BUFFER_PTS(first);
   if (GST_BUFFER_PTS_IS_VALID(first) && GST_BUFFER_PTS_IS_VALID(last) &&
       GST_BUFFER_PTS(last) >= time.timestamp)
@@ -120,26 +124,28 @@ static FrameTime time_of_waiting(const State& state) {
   return time;
 }
 
-// After a call that may solve, with the engine lock: the property's picture and its time belong
-// together.
-static void note_solve(GstQdmdBackground* self) {
+// After a call that may bring a background into use, with the engine lock: the property's picture
+// and its time belong together.
+static void note_solve(GstQdmdBackground* self, GstBuffer* leaving) {
   State* state = self->state;
   if (state->engine.solves() == state->solves_told) return;
-  const FrameTime time = time_of_waiting(*state);
+  const FrameTime time = time_of_solve(*state, leaving);
   state->background.solved(GST_BASE_TRANSFORM(self)->segment, time.timestamp, time.duration);
 }
 
 // Says what a new solve found.
-static void tell_of_solve(GstQdmdBackground* self) {
+static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
   State* state = self->state;
-  if (state->engine.solves() == state->solves_told || state->shells.empty()) return;
-  state->solves_told = state->engine.solves();
+  const guint64 solves = state->engine.solves() - state->solves_told;
+  if (solves == 0) return;
+  state->solves_told += solves;
   GST_OBJECT_LOCK(self);
+  state->counters.solves += solves;
   const bool post = state->settings.post_messages;
   const Counters counters = state->counters;
   GST_OBJECT_UNLOCK(self);
   if (!post) return;
-  const FrameTime time = time_of_waiting(*state);
+  const FrameTime time = time_of_solve(*state, leaving);
   gst_element_post_message(
       GST_ELEMENT(self), gst_message_new_element(
                              GST_OBJECT(self), make_solve_message(state->engine.report(), counters,
@@ -217,6 +223,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       if (settings.regions) regions = next_regions(self, settings.regions_min_area);
       state->io.write(&frame, settings.output,
                       [&](const MutableImageView& view) { engine.pop(settings.output, view); });
+      note_solve(self, shell.get());
       return Status();
     });
     if (!written) {
@@ -226,6 +233,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   }
   attach(buffer.get(), regions);
   publish_report(self, 0, 1);
+  tell_of_solve(self, shell.get());
   *out = buffer.release();
   return GST_FLOW_OK;
 }
@@ -237,11 +245,11 @@ GstFlowReturn drain(GstQdmdBackground* self) {
   GstFlowReturn flow = GST_FLOW_OK;
   const auto solve = [self](Engine& engine) {
     const Status status = engine.drain();
-    note_solve(self);
+    note_solve(self, nullptr);
     return status;
   };
   if (!with_engine(self, solve)) flow = GST_FLOW_ERROR;
-  if (flow == GST_FLOW_OK) tell_of_solve(self);
+  if (flow == GST_FLOW_OK) tell_of_solve(self, nullptr);
   while (flow == GST_FLOW_OK && state->engine.ready()) {
     GstBuffer* buffer = nullptr;
     flow = next_output(self, &buffer);
@@ -290,6 +298,21 @@ static void warn_of_settings_without_effect(GstQdmdBackground* self, const Setti
   }
 }
 
+// Frames that stand alone make no window: says so once.
+static void warn_of_breaks(GstQdmdBackground* self, bool jump) {
+  State* state = self->state;
+  constexpr guint kMany = 3;
+  state->breaks = jump ? state->breaks + 1 : 0;
+  if (state->breaks < kMany || std::exchange(state->warned_of_breaks, true)) return;
+  GST_ELEMENT_WARNING(
+      self, STREAM, FORMAT,
+      ("Frames are too far apart in time to make a window: each begins a new one and is its own "
+       "background. More than one second and more than %d frames of the caps' framerate break "
+       "time: set the framerate at which they come, for instance with videorate.",
+       kMostGapFrames),
+      (nullptr));
+}
+
 bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideoInfo& info,
                GstCaps* caps) {
   State* state = self->state;
@@ -298,13 +321,16 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   state->solves_told = 0;
   EngineOptions options = settings.engine;
   options.caller_bytes = FrameIo::bytes(info);
+  options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
+                           ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
+                           : Latency::kAssumedRate;
   return with_engine(self, [&](Engine& engine) {
     state->background.keep(engine, state->io);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
     if (status.ok())
-      state->shells.reserve(static_cast<size_t>(options.window_size));
+      state->shells.reserve(static_cast<size_t>(engine.delay()) + 1);
     else
       engine.flush();
     return status;
@@ -318,6 +344,7 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
   GST_OBJECT_UNLOCK(self);
   const bool jump = time_jumps(self, input);
   if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
+  warn_of_breaks(self, jump);
   // The base class keeps is_discont set until something was pushed, which can be a window later:
   // the buffer's own flag says where time breaks.
   if (GST_BUFFER_IS_DISCONT(input) || jump || reset) {
@@ -325,7 +352,24 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
     if (flow != GST_FLOW_OK) return flow;
   }
   if (reset) drop_frames(self);
+  self->state->came = g_get_monotonic_time();
   return GST_FLOW_OK;
+}
+
+// After a frame came: whether the next to leave waits longer than sinks were told.
+static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, bool solved) {
+  State* state = self->state;
+  const gint64 held = solved ? g_get_monotonic_time() - state->came : 0;
+  GST_OBJECT_LOCK(self);
+  bool grew = state->latency.frame_in(timestamp);
+  if (state->engine.ready())
+    grew |= state->latency.frame_out(GST_BUFFER_PTS(state->shells.at(0)),
+                                     guint64(MAX(held, 0)) * GST_USECOND);
+  const GstClockTime latency = state->latency.promised();
+  GST_OBJECT_UNLOCK(self);
+  if (!grew) return;
+  GST_INFO_OBJECT(self, "latency is %" GST_TIME_FORMAT " by now", GST_TIME_ARGS(latency));
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
 GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
@@ -358,7 +402,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_threads(threads);
       engine.set_time_budget(budget / 1000);
       const Status status = engine.push(state->io.read(frame));
-      note_solve(self);
+      note_solve(self, nullptr);
       return status;
     });
     if (!taken) {
@@ -367,7 +411,9 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
     }
   }
   publish_report(self, 1, 0);
-  tell_of_solve(self);
+  const bool solved = state->engine.solves() != state->solves_told;
+  tell_of_solve(self, nullptr);
+  follow_latency(self, GST_BUFFER_PTS(buffer.get()), solved);
   return GST_FLOW_OK;
 }
 

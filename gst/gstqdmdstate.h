@@ -11,6 +11,7 @@
 #include "gst/frameio.h"
 #include "gst/gstqdmdbackground.h"
 #include "gst/gstqdmdsettings.h"
+#include "gst/latency.h"
 #include "gst/pointers.h"
 #include "gst/solvereport.h"
 
@@ -19,7 +20,7 @@ namespace qdmd {
 struct State {
   // Protected by the object lock.
   Settings settings;
-  GstClockTime latency = 0;
+  Latency latency;  // written with the stream lock, too
   Counters counters;
   bool reset_asked = false;
   SolveReport report;
@@ -37,8 +38,11 @@ struct State {
   // upstream's pools never wait for a window.
   BufferQueue shells;
   std::vector<guint8> mask, residual;  // for regions
-  guint64 solves_told = 0;
-  guint warned = 0;                             // settings without effect, a bit for each id
+  guint64 solves_told = 0;             // of the engine's
+  guint breaks = 0;                    // in time, one after another, with a frame between them
+  bool warned_of_breaks = false;
+  gint64 came = 0;   // the newest frame, in microseconds of the system's clock
+  guint warned = 0;  // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };
 

@@ -25,30 +25,38 @@ struct UnrefCaps {
 };
 using CapsPtr = std::unique_ptr<GstCaps, UnrefCaps>;
 
-// Buffers in the order in which they came. Its memory is used again once it was empty, as it is
-// after each window and each live frame.
+// Buffers in the order in which they came: a ring.
 class BufferQueue {
  public:
-  bool empty() const { return first_ == buffers_.size(); }
-  size_t size() const { return buffers_.size() - first_; }
-  GstBuffer* front() const { return buffers_[first_].get(); }
-  GstBuffer* back() const { return buffers_.back().get(); }
-  // Room for `count` buffers. Throws std::bad_alloc, as push() does beyond that.
-  void reserve(size_t count) { buffers_.reserve(count); }
-  void push(BufferPtr buffer) { buffers_.push_back(std::move(buffer)); }
+  bool empty() const { return size_ == 0; }
+  size_t size() const { return size_; }
+  // 0: the oldest.
+  GstBuffer* at(size_t index) const { return ring_[(first_ + index) % ring_.size()].get(); }
+  // Room for `count` buffers in all. Throws std::bad_alloc, as push() does beyond that.
+  void reserve(size_t count) {
+    if (count <= ring_.size()) return;
+    std::vector<BufferPtr> ring(count);
+    for (size_t i = 0; i < size_; ++i) ring[i] = std::move(ring_[(first_ + i) % ring_.size()]);
+    ring_ = std::move(ring);
+    first_ = 0;
+  }
+  void push(BufferPtr buffer) {
+    if (size_ == ring_.size()) reserve(2 * size_ + 1);
+    ring_[(first_ + size_++) % ring_.size()] = std::move(buffer);
+  }
   BufferPtr pop() {
-    BufferPtr buffer = std::move(buffers_[first_++]);
-    if (empty()) clear();
+    BufferPtr buffer = std::move(ring_[first_]);
+    first_ = (first_ + 1) % ring_.size();
+    --size_;
     return buffer;
   }
   void clear() {
-    buffers_.clear();
-    first_ = 0;
+    while (!empty()) pop();
   }
 
  private:
-  std::vector<BufferPtr> buffers_;
-  size_t first_ = 0;
+  std::vector<BufferPtr> ring_;
+  size_t first_ = 0, size_ = 0;
 };
 
 }  // namespace qdmd

@@ -63,11 +63,11 @@ class Background {
   double fixed_threshold() const { return fixed_threshold_; }
 
  private:
-  int next() const { return room_.keep_pictures ? 1 - newest_ : newest_; }
+  int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 
   LearnerRoom room_;
   std::unique_ptr<Learner> learner_;
-  // Where pictures are kept, one is in use while the next is built.
+  // Of two, one is in use while the next is built.
   BackgroundModel models_[2];
   int newest_ = 0;
   std::optional<SnapshotRange> snapshots_;  // of the next

@@ -6,6 +6,8 @@
 namespace qdmd {
 namespace {
 
+using State = Background::State;
+
 // Frames that enter the Gram matrix together: few enough that little is left to do when a window is
 // full, enough that they fill a register tile and the window is not read from memory for each of
 // them.
@@ -13,89 +15,143 @@ constexpr int kGroup = 16;
 
 }  // namespace
 
+BatchSchedule::BatchSchedule(const Stage& stage, int window_size, int late_frames)
+    : Schedule(stage), window_size_(window_size), late_frames_(late_frames) {}
+
 bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
-  if (queue->pending == 0) begin_window(freeze);
-  if (start_new_window_) {
-    wait();
-    frames().clear();
-    not_added_ = 0;
-    start_new_window_ = false;
+  if (queue->pending == 0) begin_stream();
+  if (!collection_) {
+    collection_ = Collection{taken(), freeze};
+    if (!waiting_) decide();
   }
   if (!frames().append(frame)) return false;
   ++queue->pending;
+  ++collection_->not_added;
   pace().count_frame();
-  // Frames of the window before are left out: they count only if this window ends early.
-  if (++not_added_ == std::min(kGroup, window_size_) &&
-      background().state() == Background::State::learnt)
-    add_group(SnapshotRange(frames().window()).newest(queue->pending));
-  if (queue->pending == window_size_) solve(queue);
+  if (collected() == window_size_) {
+    end_window(late_frames_ == 0);
+  } else if (!waiting_ && collection_->state == State::learnt &&
+             collection_->not_added >= std::min(kGroup, window_size_)) {
+    add_group();
+  }
+  if (queue->pending < window_size_ + late_frames_) return true;
+  queue->ready = 1;
+  if (next_to_leave(*queue) == shown_.end) advance();
   return true;
 }
 
-void BatchSchedule::begin_window(bool freeze) {
-  using State = Background::State;
+// No frame waits.
+void BatchSchedule::begin_stream() {
+  if (background().known() && background().model().reads_snapshots()) {
+    // They are about to make room for others; somebody may still ask for this background.
+    background().model().freeze_at(background().report().window_frames - 1);
+  }
+  if (!std::exchange(break_, false)) return;
+  wait();
+  frames().clear();
+  history_from_ = taken();
+}
+
+// What becomes of the window that is collected: once the background before it is in use.
+void BatchSchedule::decide() {
+  Collection& window = *collection_;
+  window.decided = true;
   const bool solves = pace().next_stretch(&background());
   // After a freeze, the next window is solved.
-  if (freeze) pace().solve_next();
+  if (window.freeze) pace().solve_next();
   if (!background().known()) return;
-  const double last = frames().size() - 1;
-  if (freeze || !solves) {
-    background().hold(last, freeze ? State::held : State::held_in_light);
-    // Until the first of its frames is shown.
-    if (!freeze && frames().size() > 0) background().follow_light(frames().window().newest_slot());
-  } else if (background().state() != State::learnt) {
-    background().learn();
+  if (window.freeze)
+    window.state = State::held;
+  else if (!solves)
+    window.state = State::held_in_light;
+  else if (background().state() != State::learnt)
     // Frames that came meanwhile are in no Gram matrix.
-    start_new_window_ = true;
-  } else if (background().model().reads_snapshots()) {
-    // They are about to make room for others; somebody may still ask for this background.
-    background().model().freeze_at(last);
-  }
+    history_from_ = window.begin;
 }
 
-// Goes on beside the frames that follow.
-void BatchSchedule::add_group(const SnapshotRange& span) {
+// Goes on beside the frames that follow. Frames of the window before are left out: they count only
+// if this window ends early.
+void BatchSchedule::add_group() {
   wait();
-  group_ = Group{span, std::exchange(not_added_, 0)};
+  const SnapshotRange span = SnapshotRange(frames().window()).newest(collected());
+  work_ = Work{span, std::exchange(collection_->not_added, 0)};
   // What a std::function holds without memory of its own.
-  side().start([this] { background().learner().add(group_->span, group_->frames, {}); });
+  side().start([this] { background().learner().add(work_->span, work_->fresh, {}); });
 }
 
-// A model for the window as it is.
-void BatchSchedule::solve(Queue* queue) {
-  queue->ready = queue->pending;
-  const int not_added = std::exchange(not_added_, 0);
-  if (background().state() != Background::State::learnt) return;
+// The window that is collected waits from now on, and is solved.
+void BatchSchedule::end_window(bool at_once) {
+  const Collection window = *std::exchange(collection_, std::nullopt);
+  waiting_ = Stretch{window.begin, taken(), window.begin, window.state};
+  if (window.state != State::learnt) return;
   wait();
-  const SnapshotRange window(frames().window());
-  const int fresh = queue->pending < window.size() ? queue->pending : not_added;
-  if (fresh > 0) background().learner().add(window, fresh, {});
-  background().begin(window);
+  const auto count = static_cast<int>(taken() - window.begin);
+  const int size = static_cast<int>(std::min<int64_t>(
+      {window_size_, frames().size(), taken() - std::min(history_from_, window.begin)}));
+  const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
+  waiting_->time_zero = taken() - size;
+  work_ = Work{span, count < size ? count : window.not_added, background().fixed_threshold()};
+  // Reads how many frames there are.
+  if (background().learner().in_one_piece()) background().begin(span);
+  if (at_once)
+    solve();
+  else
+    side().start([this] { solve(); });
+}
+
+void BatchSchedule::solve() {
+  if (work_->fresh > 0) background().learner().add(work_->span, work_->fresh, {});
+  if (!background().learner().in_one_piece()) background().begin(work_->span);
   background().build({});
-  background().finish(background().fixed_threshold());
-  background().publish();
+  background().finish(work_->threshold);
+}
+
+// The last frame of a window has left: the background of the next comes into use.
+void BatchSchedule::advance() {
+  // Of a window that ended early.
+  if (!waiting_) end_window(true);
+  const Stretch next = *waiting_;
+  if (next.state == State::learnt) {
+    wait();
+    background().publish();
+  } else {
+    background().hold(background().report().window_frames - 1, next.state);
+  }
+  shown_ = next;
+  waiting_.reset();
+  if (collection_ && !collection_->decided) decide();
 }
 
 void BatchSchedule::drain(Queue* queue) {
-  if (queue->pending > queue->ready) solve(queue);
-  start_new_window_ = true;
+  break_ = true;
+  if (queue->pending == 0) return;
+  queue->ready = queue->pending;
+  if (next_to_leave(*queue) == shown_.end) advance();
 }
 
 void BatchSchedule::restart() {
   side().abandon();
   frames().clear();
-  not_added_ = 0;
-  start_new_window_ = false;
+  waiting_.reset();
+  collection_.reset();
+  break_ = false;
+  history_from_ = taken();
+  shown_ = {taken(), taken(), taken()};
 }
 
 void BatchSchedule::show(int index) {
-  if (background().state() == Background::State::held_in_light)
-    background().follow_light(frames().slot(index));
-  background().model().set_time(index);
+  const int64_t frame = kept_from() + index;
+  if (frame == shown_.end) advance();
+  if (background().state() == State::held_in_light) background().follow_light(frames().slot(index));
+  background().model().set_time(static_cast<double>(frame - shown_.time_zero));
 }
 
 void BatchSchedule::show_newest() {
   background().model().set_time(background().report().window_frames - 1);
+}
+
+int BatchSchedule::frames_left(const Queue& queue) const {
+  return static_cast<int>(std::max<int64_t>(0, shown_.end - next_to_leave(queue)));
 }
 
 }  // namespace qdmd

@@ -1,6 +1,7 @@
-// Frames leave a window at a time, each against its own window's model.
+// One frame leaves for each that comes, against its own window's model.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "core/engine/schedule.h"
@@ -8,33 +9,65 @@
 namespace qdmd {
 
 // A window is collected; its frames enter the Gram matrix in groups, beside those that follow. The
-// last one solves. Where the background is held, which is decided when a window begins, its frames
-// wait all the same. What drain() finds is solved with as many frames before it as make a window.
+// last one begins the solve, which has until `late_frames` frames later (0: it is done at once).
+// From then on a frame of the window leaves with each that comes, while the next window is
+// collected: a frame waits for window_size - 1 + late_frames others, whatever time a solve takes.
+// Where the background is held, which is decided when a window begins, its frames wait all the
+// same. What drain() finds in an unfinished window is solved with as many frames before it as make
+// a window.
 class BatchSchedule : public Schedule {
  public:
-  BatchSchedule(const Stage& stage, int window_size) : Schedule(stage), window_size_(window_size) {}
+  // late_frames < window_size.
+  BatchSchedule(const Stage& stage, int window_size, int late_frames);
 
   bool push(const ImageView& frame, bool freeze, Queue* queue) override;
   void drain(Queue* queue) override;
   void restart() override;
   void show(int index) override;
   void show_newest() override;
+  int frames_left(const Queue& queue) const override;
 
  private:
-  // Frames on their way into the Gram matrix.
-  struct Group {
+  // Frames [begin, end) that leave with one background; frames are counted as the store does.
+  struct Stretch {
+    int64_t begin = 0, end = 0;
+    int64_t time_zero = 0;  // the first snapshot of its model
+    Background::State state = Background::State::learnt;
+  };
+  // The one that is collected.
+  struct Collection {
+    int64_t begin = 0;
+    bool freeze = false;
+    bool decided = false;  // what its state is
+    Background::State state = Background::State::learnt;
+    int not_added = 0;  // newest frames whose inner products are not computed yet
+  };
+  // The side thread's.
+  struct Work {
     SnapshotRange span;
-    int frames;
+    int fresh;             // newest frames that enter the Gram matrix
+    double threshold = 0;  // of the foreground, fixed by somebody
   };
 
-  void begin_window(bool freeze);
-  void add_group(const SnapshotRange& span);
-  void solve(Queue* queue);
+  int64_t taken() const { return static_cast<int64_t>(frames().frames_taken()); }
+  int64_t kept_from() const { return taken() - frames().size(); }
+  int collected() const { return collection_ ? static_cast<int>(taken() - collection_->begin) : 0; }
+  int64_t next_to_leave(const Queue& queue) const { return taken() - queue.pending; }
 
-  int window_size_;
-  bool start_new_window_ = false;
-  int not_added_ = 0;           // newest frames whose inner products are not computed yet
-  std::optional<Group> group_;  // what the side thread is at
+  void begin_stream();
+  void decide();
+  void add_group();
+  void end_window(bool at_once);
+  void solve();
+  void advance();
+
+  int window_size_, late_frames_;
+  bool break_ = false;        // the next frame begins a new stream
+  int64_t history_from_ = 0;  // frames from there on may be in one model
+  Stretch shown_;             // with the background in use
+  std::optional<Stretch> waiting_;
+  std::optional<Collection> collection_;
+  std::optional<Work> work_;
 };
 
 }  // namespace qdmd

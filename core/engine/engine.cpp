@@ -41,16 +41,16 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       FrameStore(layout_.capacity, width, height, learner->contents(), options.max_memory - beside);
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
-  // Where frames make room for others before their model is used, its modes are pictures.
   background_ = std::make_unique<Background>(
       std::move(learner),
-      LearnerRoom{&frames_, options.window_size, live, &workers_->pool(), &clock_});
+      LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
+                  &workers_->pool(), &clock_});
   background_->set_threshold(options.foreground_threshold);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
     schedule_ = std::make_unique<LiveSchedule>(stage, plan);
   else
-    schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size);
+    schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size, layout_.late_frames);
   return {};
 } catch (...) {
   close();

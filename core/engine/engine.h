@@ -8,14 +8,15 @@
 
 namespace qdmd {
 
-// Batch: push() collects window_size frames and solves; then pop() gives all of them back, in
-// order, each against its own L(t). drain() solves for a remainder, on the last window_size frames
-// seen (fewer where the stream is shorter). Live: each push() makes its frame ready, against the
-// newest model, extrapolated to the frame's time. A solve on the last window_size frames begins
-// every hop_size frames, earlier while the window fills up, and its work is spread over the frames
-// that follow (LivePlan). drain() begins a new window and keeps the background as it is until
-// there is a new model. Every frame pushed is popped exactly once, unless flush() drops it. Results
-// do not depend on the number of threads or on time. Not thread safe.
+// Batch: push() collects window_size frames, which are then solved, at once or beside the frames
+// that follow; from then on a frame is ready with each that is pushed, in order, each against its
+// own window's L(t), delay() frames later. drain() makes all ready; a remainder is solved on the
+// last window_size frames seen (fewer where the stream is shorter). Live: each push() makes its
+// frame ready, against the newest model, extrapolated to the frame's time. A solve on the last
+// window_size frames begins every hop_size frames, earlier while the window fills up, and its work
+// is spread over the frames that follow (LivePlan). drain() begins a new window and keeps the
+// background as it is until there is a new model. Every frame pushed is popped exactly once, unless
+// flush() drops it. Results do not depend on the number of threads or on time. Not thread safe.
 // Throws std::bad_alloc where memory runs out. Frames that wait are lost then, as after flush(),
 // and the engine goes on with the next frame; after configure() it is not configured.
 class Engine {
@@ -30,7 +31,7 @@ class Engine {
   // Gives all memory and threads back; configure() comes next.
   void close();
 
-  // Copies a frame in. Batch: solves when the window is full.
+  // Copies a frame in.
   Status push(const ImageView& frame);
   // True while pop() has a frame.
   bool ready() const { return queue_.ready > 0; }
@@ -42,11 +43,16 @@ class Engine {
   // Writes the newest background: that of the last frame of a batch that was solved for, or of the
   // frame with which a live model came; or the one that is held. False: there is none yet.
   bool write_background(const MutableImageView& out);
-  // Makes every waiting frame ready. The frame after it belongs to a new window: time is broken.
+  // Makes every waiting frame ready; their windows may be solved as they are popped. The frame
+  // after it belongs to a new window: time is broken.
   Status drain();
   // Drops all frames and forgets the window and the model.
   void flush();
 
+  // Frames that are pushed before a frame leaves: EngineLayout::delay.
+  int delay() const { return layout_.delay; }
+  // Of the frames that wait, the next so many leave with the background that report() is about.
+  int frames_left() const { return schedule_ ? schedule_->frames_left(queue_) : 0; }
   // Frames pushed and not popped.
   int pending() const { return queue_.pending; }
   uint64_t solves() const { return background_ ? background_->solves() : 0; }

@@ -1,5 +1,8 @@
 #include "core/engine/engine_options.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
@@ -16,22 +19,30 @@ uint64_t saturating_sum(uint64_t a, uint64_t b) {
   return __builtin_add_overflow(a, b, &a) ? UINT64_MAX : a;
 }
 
-}  // namespace
-
-LivePlan plan_of(const EngineOptions& options, int width, int height) {
-  return plan_for(options, *Learner::make(options, width, height), width, height);
+// In batch mode.
+int late_frames_of(const EngineOptions& options, const Learner& learner) {
+  // A solve that takes less of a frame's time is done at once.
+  constexpr double kAtOnce = 1.0 / 3;
+  // The estimate is that of one machine, with nothing else to do.
+  constexpr double kMargin = 1.5;
+  const double frames = learner.solve_seconds(options.window_size) * options.frame_rate;
+  if (!(frames > kAtOnce)) return 0;
+  return static_cast<int>(std::min<double>(std::ceil(kMargin * frames), options.window_size / 2));
 }
 
-EngineLayout layout_of(const EngineOptions& options, int width, int height) {
-  const auto learner = Learner::make(options, width, height);
+EngineLayout layout_with(const EngineOptions& options, const Learner& learner, int width,
+                         int height, int late_frames) {
   const bool live = options.mode == Mode::live;
   EngineLayout layout;
-  layout.sample_step = learner->sample_steps().front();
-  layout.capacity = options.window_size;
-  if (live) layout.capacity += plan_for(options, *learner, width, height).most_late_frames();
+  layout.late_frames = late_frames;
+  layout.delay = live ? 0 : options.window_size - 1 + late_frames;
+  layout.sample_step = learner.sample_steps().front();
+  layout.capacity = options.window_size + late_frames;
+  // They are read until the last of them has left.
+  if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   layout.frame_bytes =
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner->contents());
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner.contents());
   // Sums over more pixels than the Gram matrix can have may be any number.
   if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36) {
     layout.bytes = UINT64_MAX;
@@ -39,8 +50,32 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
   }
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, options.caller_bytes),
-      learner->bytes(options.window_size, layout.capacity, live, Workers::count(options.threads)));
+      learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
+                    Workers::count(options.threads)));
   return layout;
+}
+
+}  // namespace
+
+LivePlan plan_of(const EngineOptions& options, int width, int height) {
+  return plan_for(options, *Learner::make(options, width, height), width, height);
+}
+
+Models models_of(Mode mode, int late_frames) {
+  if (mode == Mode::live) return Models::two_of_live;
+  return late_frames > 0 ? Models::two : Models::one;
+}
+
+EngineLayout layout_of(const EngineOptions& options, int width, int height) {
+  const auto learner = Learner::make(options, width, height);
+  if (options.mode == Mode::live)
+    return layout_with(options, *learner, width, height,
+                       plan_for(options, *learner, width, height).most_late_frames());
+  // Less time for a solve where there is no room for more frames.
+  for (int late = late_frames_of(options, *learner);; late /= 2) {
+    const EngineLayout layout = layout_with(options, *learner, width, height, late);
+    if (late == 0 || layout.bytes <= options.max_memory) return layout;
+  }
 }
 
 std::string describe(const EngineOptions& options, int width, int height) {
@@ -54,7 +89,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
   if (options.window_size < EngineOptions::kMinWindow ||
       options.window_size > EngineOptions::kMaxWindow)
     return {Code::invalid_options, "window-size must be 2 to 2048 frames"};
-  if (options.hop_size < 0 || options.hop_size > options.window_size)
+  if (options.hop_size < 0 ||
+      (options.mode == Mode::live && options.hop_size > options.window_size))
     return {Code::invalid_options, "hop-size must be 0 (a quarter of the window) to window-size"};
   if (options.iterations < 1 || options.iterations > EngineOptions::kMaxIterations)
     return {Code::invalid_options, "iterations must be 1 to 20"};
@@ -64,6 +100,7 @@ Status check_options(const EngineOptions& options, int width, int height) {
       !(options.foreground_threshold >= 0))
     return {Code::invalid_options,
             "rank, omega-threshold and foreground-threshold must not be negative"};
+  if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
   const EngineLayout layout = layout_of(options, width, height);

@@ -6,7 +6,7 @@
 
 #include "core/base/status.h"
 #include "core/engine/live_plan.h"
-#include "core/learn/method.h"
+#include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
 namespace qdmd {
@@ -24,20 +24,25 @@ struct EngineOptions : LearnOptions {
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
+  double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;
 };
 
 // What options and frame size come to.
 struct EngineLayout {
-  int capacity = 0;  // frames that are kept: the window's, in live mode also those that arrive
-                     // while one is solved
+  int delay = 0;        // frames that a frame waits for: batch: window_size - 1 and late_frames
+  int late_frames = 0;  // frames that arrive while a window is solved and is still needed
+  int capacity = 0;     // frames that are kept
   int sample_step = 1;
   uint64_t frame_bytes = 0;  // of the planes of the frames that are kept
   uint64_t store_bytes = 0;  // of these and of all that belongs to a frame
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
+
+// Models of batch and live mode.
+Models models_of(Mode mode, int late_frames);
 
 // Of live mode, for frames of that size.
 LivePlan plan_of(const EngineOptions& options, int width, int height);

@@ -21,6 +21,7 @@ class LiveSchedule : public Schedule {
   void restart() override;
   void show(int index) override;
   void show_newest() override;
+  int frames_left(const Queue& queue) const override { return queue.pending; }
 
  private:
   // A group of frames on its way into the Gram matrix.

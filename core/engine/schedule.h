@@ -20,7 +20,7 @@ struct Stage {
 };
 
 // Frames that were pushed and wait to be popped: the newest `pending` of the store. The oldest
-// `ready` of them may leave.
+// `ready` of them may leave, one after the other.
 struct Queue {
   int pending = 0, ready = 0;
 };
@@ -45,6 +45,8 @@ class Schedule {
   virtual void show(int index) = 0;
   // The same for the newest background.
   virtual void show_newest() = 0;
+  // Of the frames that wait, the next so many leave with the background in use.
+  virtual int frames_left(const Queue& queue) const = 0;
 
  protected:
   FrameStore& frames() const { return *stage_.frames; }

@@ -25,18 +25,46 @@ GramLearner::GramLearner(const LearnOptions& options, int width, int height)
       height_(height),
       step_(options.sample_step > 0 ? options.sample_step : kChosenStep) {}
 
-uint64_t GramLearner::bytes(int window_size, int capacity, bool keep_pictures, int threads) const {
+uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int threads) const {
   const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
   DmdOptions dmd = options_.dmd;
-  if (keep_pictures) dmd.max_modes = BackgroundModel::most_modes(window_size);
+  if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
   const double seen = static_cast<double>(sample_count(width_, height_, step_));
   return SlidingGram::bytes(capacity, threads) +
          (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
-         (keep_pictures ? 2 : 1) *
-             BackgroundModel::bytes(pixels, window_size, pictures, keep_pictures);
+         (models == Models::one ? 1 : 2) *
+             BackgroundModel::bytes(pixels, window_size, pictures, models == Models::two_of_live);
+}
+
+bool GramLearner::may_read_frames(int window_size) const {
+  const int pictures = options_.method == Method::dmd
+                           ? most_channel_pictures(options_.dmd, window_size)
+                           : most_pictures(options_.dmd, window_size);
+  return BackgroundModel::may_combine_directly(pictures, window_size);
+}
+
+double GramLearner::solve_seconds(int window_size) const {
+  const double m = window_size, n = static_cast<double>(width_) * height_;
+  // The pictures, which read the window once, and a small problem; or a factorization of pixels.
+  double seconds = 1e-9 * n * m + 2e-8 * m * m * m;
+  if (options_.method == Method::dmd) return seconds;
+  switch (options_.dmd.solver) {
+    case Solver::gram:
+      break;
+    case Solver::gram_extended:
+      seconds += 1e-7 * m * m * m;
+      break;
+    case Solver::qr:
+      seconds += 1e-8 * n * m * m;
+      break;
+    case Solver::adjoint:
+      seconds += 1e-7 * n * m * m;
+      break;
+  }
+  return seconds;
 }
 
 uint64_t GramLearner::solver_bytes(int window_size) const {
@@ -47,7 +75,8 @@ uint64_t GramLearner::solver_bytes(int window_size) const {
 
 void GramLearner::begin(const LearnerRoom& room) {
   room_ = room;
-  if (room.keep_pictures) options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
+  if (room.models == Models::two_of_live)
+    options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   gram_ = SlidingGram(room.frames->capacity(), room.pool);
 }
 
@@ -88,7 +117,7 @@ void GramLearner::build(Slice slice, BackgroundModel* model) {
   const Clock::Span span_of_time(*room_.clock, Clock::pictures);
   if (slice.index == 0) {
     built_ = decomposed_;
-    model->begin(*snapshots_, background_, room_.keep_pictures);
+    model->begin(*snapshots_, background_, room_.models == Models::two_of_live);
   }
   const size_t first = slice.first(snapshots_->pixels(), kUnit),
                length = slice.size(snapshots_->pixels(), kUnit);

@@ -18,7 +18,9 @@ class GramLearner : public Learner {
   FrameContents contents() const override { return {step_, 0}; }
   std::vector<int> sample_steps() const override { return {step_}; }
   bool in_one_piece() const override { return false; }
-  uint64_t bytes(int window_size, int capacity, bool keep_pictures, int threads) const override;
+  uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
+  bool may_read_frames(int window_size) const override;
+  double solve_seconds(int window_size) const override;
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;

@@ -26,11 +26,18 @@ struct SolveFacts {
   double gram_time = 0, solve_time = 0;
 };
 
+// What models a learner makes.
+enum class Models {
+  one,         // the next in place of the one in use
+  two,         // the next beside the one in use
+  two_of_live  // and the one in use outlives its window's frames: all its modes are pictures
+};
+
 // Where a learner works.
 struct LearnerRoom {
   const FrameStore* frames;  // made for the learner's contents()
   int window_size;           // snapshots of a solve, at most
-  bool keep_pictures;        // models outlive their window's frames
+  Models models;
   Pool* pool;
   Clock* clock;
 };
@@ -54,7 +61,12 @@ class Learner {
   virtual bool in_one_piece() const = 0;
   // Bytes beside the frames, for as many as a FrameStore of `capacity` has, with its models: the
   // most that are taken at once.
-  virtual uint64_t bytes(int window_size, int capacity, bool keep_pictures, int threads) const = 0;
+  virtual uint64_t bytes(int window_size, int capacity, Models models, int threads) const = 0;
+  // True where a model may read its window's frames as long as it is in use, Models::two_of_live
+  // aside.
+  virtual bool may_read_frames(int window_size) const = 0;
+  // Estimate of the seconds of a solve, with two threads of a machine of 2024.
+  virtual double solve_seconds(int window_size) const = 0;
   // Estimate of the bytes of a solver that works on pixels; 0: it works on the Gram matrix.
   virtual uint64_t solver_bytes(int window_size) const = 0;
 

@@ -54,7 +54,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   // Room for more pictures is made without the old ones beside it.
   if (samples_.capacity() < pictures * pixels_) std::vector<float>().swap(samples_);
   direct_ = !keep_pictures &&
-            pictures * sizeof(float) > static_cast<size_t>(kChannels * snapshots.size());
+            may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
   make_pictures(direct_ ? 0 : pictures);
   if (!direct_) group_by_four(basis_, &coefficients_);
 }

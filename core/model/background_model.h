@@ -51,6 +51,11 @@ class BackgroundModel {
   // limits.
   static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures);
 
+  // True where so many pictures of modes would take more memory than their window.
+  static bool may_combine_directly(int pictures, int snapshots) {
+    return static_cast<size_t>(pictures) * sizeof(float) >
+           static_cast<size_t>(kChannels) * static_cast<size_t>(snapshots);
+  }
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
 

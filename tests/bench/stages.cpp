@@ -60,7 +60,7 @@ class Batch {
         out_(camera_.frame_bytes()),
         pool_(c.threads),
         background_(Learner::make(c.options(), c.width, c.height),
-                    {&frames_, c.window, false, &pool_, &clock_}) {}
+                    {&frames_, c.window, Models::one, &pool_, &clock_}) {}
 
   StageTimes run() {
     // One thread's time is what it computed, because others may use the machine.

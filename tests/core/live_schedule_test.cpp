@@ -28,7 +28,7 @@ struct Spread {
         frames(options.window_size + plan.most_late_frames(), static_cast<int>(pixels), 1,
                {std::max(options.sample_step, 1), 0}),
         background(Learner::make(options, static_cast<int>(pixels), 1),
-                   {&frames, options.window_size, true, &workers.pool(), &clock}),
+                   {&frames, options.window_size, Models::two_of_live, &workers.pool(), &clock}),
         live({&frames, &background, &workers, &pace, &clock}, plan) {}
   ~Spread() { live.restart(); }
 

@@ -90,7 +90,7 @@ Outcome measure(const Clip& clip, const Setting& setting, Pool* pool) {
   Clock clock;
   RobustLearner learner(options, size.width, size.height, setting.parameters);
   FrameStore frames(capacity, size.width, size.height, learner.contents());
-  learner.begin({&frames, capacity, false, pool, &clock});
+  learner.begin({&frames, capacity, Models::one, pool, &clock});
   for (int w = 0; w < windows; ++w) {
     const auto start = std::chrono::steady_clock::now();
     frames.clear();

@@ -46,11 +46,10 @@ size_t RobustLearner::samples_at(int step) const {
   return sample_count(grid_.width, grid_.height, step);
 }
 
-uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
-                              int threads) const {
+uint64_t RobustLearner::bytes(int window_size, int capacity, Models models, int threads) const {
   const auto workers = static_cast<uint64_t>(threads);
   DmdOptions dmd = options_.dmd;
-  if (keep_pictures) dmd.max_modes = BackgroundModel::most_modes(window_size);
+  if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const uint64_t looks = static_cast<uint64_t>(std::min(window_size, parameters_.start_frames)) + 1;
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
@@ -60,8 +59,8 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
       StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
       PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
       SlidingGram::bytes(capacity, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
-  const uint64_t models =
-      (keep_pictures ? 2 : 1) *
+  const uint64_t made =
+      (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
        pixels());
   // One after another: what a start compares, with densities and then a spread; masks; the
@@ -71,11 +70,17 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, bool keep_pictures,
                          std::max<uint64_t>(levels(2 * looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
-  return kept + models +
+  return kept + made +
          std::max({start, masks,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
                                        window_size),
                    filling});
+}
+
+double RobustLearner::solve_seconds(int window_size) const {
+  const double m = window_size;
+  // Passes over pixels, and over pairs of frames.
+  return options_.iterations * (3.5e-9 * static_cast<double>(pixels()) * m + 1e-6 * m * m);
 }
 
 uint64_t RobustLearner::solver_bytes(int window_size) const {
@@ -87,7 +92,8 @@ uint64_t RobustLearner::solver_bytes(int window_size) const {
 void RobustLearner::begin(const LearnerRoom& room) {
   room_ = room;
   const int capacity = room.frames->capacity();
-  if (room.keep_pictures) options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
+  if (room.models == Models::two_of_live)
+    options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = Earlier(grid_);

@@ -46,7 +46,9 @@ class RobustLearner : public Learner {
   FrameContents contents() const override { return {1, parameters_.cells_along}; }
   std::vector<int> sample_steps() const override;
   bool in_one_piece() const override { return true; }
-  uint64_t bytes(int window_size, int capacity, bool keep_pictures, int threads) const override;
+  uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
+  bool may_read_frames(int) const override { return false; }
+  double solve_seconds(int window_size) const override;
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;

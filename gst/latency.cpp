@@ -1,0 +1,63 @@
+#include "gst/latency.h"
+
+#include <algorithm>
+
+namespace qdmd {
+namespace {
+
+// The first intervals after which their mean is looked at; then after twice as many, and so on.
+constexpr guint64 kFirstLook = 8;
+// What sinks have in hand for what elements take (GstBaseSink's processing-deadline).
+constexpr GstClockTime kInHand = 20 * GST_MSECOND;
+// Latencies are added along a pipeline, and must not overflow.
+constexpr GstClockTime kMost = GST_CLOCK_TIME_NONE / 16;
+
+}  // namespace
+
+bool Latency::configure(guint64 frames, gint rate_n, gint rate_d) {
+  const bool known = rate_n > 0 && rate_d > 0;
+  const GstClockTime before = promised_;
+  frames_ = frames;
+  promised_ =
+      std::min(kMost, gst_util_uint64_scale(frames * GST_SECOND, known ? guint64(rate_d) : 1,
+                                            known ? guint64(rate_n) : kAssumedRate));
+  first_ = newest_ = GST_CLOCK_TIME_NONE;
+  restart();
+  return promised_ != before;
+}
+
+bool Latency::promise(GstClockTime latency) {
+  latency = std::min(latency, kMost);
+  if (frames_ == 0 || latency <= promised_) return false;
+  promised_ = latency;
+  return true;
+}
+
+bool Latency::frame_in(GstClockTime timestamp) {
+  if (!GST_CLOCK_TIME_IS_VALID(timestamp)) return false;
+  const bool follows = GST_CLOCK_TIME_IS_VALID(newest_) && timestamp > newest_;
+  newest_ = timestamp;
+  if (!follows || intervals_ == 0) {
+    first_ = timestamp;
+    intervals_ = 1;
+    return false;
+  }
+  // Of `intervals_` frames since the first.
+  const guint64 intervals = intervals_++;
+  if (intervals < kFirstLook || (intervals & (intervals - 1)) != 0) return false;
+  const GstClockTime span = timestamp - first_,
+                     needed = gst_util_uint64_scale(span, frames_, intervals);
+  // Timestamps are rounded, and cameras' frames come a bit early or late.
+  return needed > promised_ + promised_ / 16 && promise(needed + span / intervals);
+}
+
+bool Latency::frame_out(GstClockTime timestamp, GstClockTime held) {
+  if (frames_ == 0 || !GST_CLOCK_TIME_IS_VALID(timestamp) || !GST_CLOCK_TIME_IS_VALID(newest_) ||
+      timestamp > newest_)
+    return false;
+  const GstClockTime waited = newest_ - timestamp;
+  if (waited > promised_ + kInHand / 2) return promise(waited + waited / 16 + held);
+  return waited + held > promised_ + kInHand && promise(waited + held + held / 4);
+}
+
+}  // namespace qdmd

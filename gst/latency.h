@@ -1,0 +1,39 @@
+// How long a frame waits in qdmdbackground: what it answers a LATENCY query.
+#pragma once
+
+#include <gst/gst.h>
+
+namespace qdmd {
+
+// In frames, from the engine; in time, from the caps' rate, and from timestamps where frames come
+// more slowly than that; and what a solve held frames up. Only grows until configure(). Calls are
+// from one thread, with a lock around those that write.
+class Latency {
+ public:
+  // That of video without a rate, in frames per second.
+  static constexpr gint kAssumedRate = 25;
+
+  // A frame waits for `frames` others, 1 / rate seconds each (unknown: 0/1). True:
+  // another latency than before.
+  bool configure(guint64 frames, gint rate_n, gint rate_d);
+  // The next frame is the first after a break. What was promised stays.
+  void restart() { intervals_ = 0; }
+  GstClockTime promised() const { return promised_; }
+
+  // Each returns true where the promise grew: a LATENCY message is due.
+  // A frame came, after the one before in time.
+  bool frame_in(GstClockTime timestamp);
+  // The frame of that timestamp leaves; a solve held it up for `held` (0: none did) after the
+  // newest came.
+  bool frame_out(GstClockTime timestamp, GstClockTime held);
+
+ private:
+  bool promise(GstClockTime latency);
+
+  guint64 frames_ = 0;
+  GstClockTime promised_ = 0;
+  GstClockTime first_ = GST_CLOCK_TIME_NONE, newest_ = GST_CLOCK_TIME_NONE;
+  guint64 intervals_ = 0;  // between these two
+};
+
+}  // namespace qdmd
