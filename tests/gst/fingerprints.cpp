@@ -6,6 +6,7 @@
 // Simulated streams, and, where QDMD_DATA names the folder of real sequences, these. Hashes hold
 // for one kind of processor: some sums are of floating point.
 #include <gst/check/gstharness.h>
+#include <gst/controller/controller.h>
 #include <gst/video/video.h>
 
 #include <algorithm>
@@ -118,6 +119,7 @@ class Run {
 
   void stream(Script script) {
     const int count = static_cast<int>(clip_.frames.size());
+    if (period_ > 0) control_output(count);
     for (int t = 0; t < count; ++t) {
       const int at = 100 * t / count, before = t == 0 ? -1 : 100 * (t - 1) / count;
       const auto reaches = [&](int mark) { return at >= mark && before < mark; };
@@ -134,8 +136,6 @@ class Run {
         gst_segment_init(&segment, GST_FORMAT_TIME);
         gst_harness_push_event(harness_, gst_event_new_segment(&segment));
       }
-      static constexpr const char* kOutputs[] = {"background", "mask", "foreground", "cutout"};
-      if (period_ > 0) set("output", kOutputs[t / period_ % 4]);
       GstBuffer* buffer = make(t);
       if (script == Script::breaks && (reaches(20) || reaches(47)))
         GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
@@ -165,6 +165,20 @@ class Run {
   }
 
  private:
+  // Each frame has the output of its own time, whenever it leaves.
+  void control_output(int count) {
+    constexpr int kOutputs[] = {0, 2, 1, 3};  // background, mask, foreground, cutout
+    GstControlSource* source = gst_interpolation_control_source_new();
+    g_object_set(source, "mode", GST_INTERPOLATION_MODE_NONE, nullptr);
+    for (int t = 0; t < count; ++t)
+      gst_timed_value_control_source_set(GST_TIMED_VALUE_CONTROL_SOURCE(source),
+                                         static_cast<GstClockTime>(t) * GST_SECOND / 25,
+                                         kOutputs[t / period_ % 4]);
+    gst_object_add_control_binding(
+        GST_OBJECT(element_),
+        gst_direct_control_binding_new_absolute(GST_OBJECT(element_), "output", source));
+    gst_object_unref(source);
+  }
   void set(const char* property, const char* value) {
     gst_util_set_object_arg(G_OBJECT(element_), property, value);
   }
