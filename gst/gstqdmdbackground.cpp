@@ -9,9 +9,9 @@
  * background, the foreground, a mask or a cut-out. Each output buffer has its own frame's
  * timestamps, flags and metadata; as many buffers come out as went in.
  *
- * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window: the element
- * reports a latency of (window-size - 1) frames. Keep audio in step with a queue of that
- * max-size-time. Its window takes 3 x window-size x width x height bytes.
+ * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
+ * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in
+ * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes.
  *
  * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
  * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"

@@ -119,13 +119,22 @@ void BatchSchedule::advance() {
   }
   shown_ = next;
   waiting_.reset();
-  if (collection_ && !collection_->decided) decide();
+  if (!collection_) return;
+  if (!collection_->decided) decide();
+  if (break_) end_early();
+}
+
+// No more frames come to the window that is collected: it is solved beside those that leave before
+// it, where there is a place for its model.
+void BatchSchedule::end_early() {
+  if (collection_ && !waiting_ && late_frames_ > 0) end_window(false);
 }
 
 void BatchSchedule::drain(Queue* queue) {
   break_ = true;
   if (queue->pending == 0) return;
   queue->ready = queue->pending;
+  end_early();
   if (next_to_leave(*queue) == shown_.end) advance();
 }
 

@@ -58,6 +58,7 @@ class BatchSchedule : public Schedule {
   void decide();
   void add_group();
   void end_window(bool at_once);
+  void end_early();
   void solve();
   void advance();
 

@@ -23,11 +23,11 @@ uint64_t saturating_sum(uint64_t a, uint64_t b) {
 int late_frames_of(const EngineOptions& options, const Learner& learner) {
   // A solve that takes less of a frame's time is done at once.
   constexpr double kAtOnce = 1.0 / 3;
-  // The estimate is that of one machine, with nothing else to do.
-  constexpr double kMargin = 1.5;
+  // Other machines, and other work on this one.
+  constexpr double kMargin = 2.5;
   const double frames = learner.solve_seconds(options.window_size) * options.frame_rate;
   if (!(frames > kAtOnce)) return 0;
-  return static_cast<int>(std::min<double>(std::ceil(kMargin * frames), options.window_size / 2));
+  return static_cast<int>(std::min<double>(std::ceil(kMargin * frames), options.window_size / 4));
 }
 
 EngineLayout layout_with(const EngineOptions& options, const Learner& learner, int width,
