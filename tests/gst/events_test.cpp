@@ -294,6 +294,46 @@ TEST(LatencyMessage, IsPostedOnceForEachChange) {
   gst_object_unref(element);
 }
 
+// Frames of 10 a second, whatever the caps say.
+TEST(LatencyMessage, IsPostedWhereFramesComeMoreSlowlyThanTheCapsSay) {
+  constexpr GstClockTime kInterval = GST_SECOND / 10;
+  for (int rate : {0, 25}) {
+    Stream stream("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24, rate);
+    GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+    GstBus* bus = gst_bus_new();
+    gst_element_set_bus(element, bus);
+    for (int t = 0; t < 40; ++t) {
+      auto buffer = stream.make_frame(t, paint_mover);
+      GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(t) * kInterval;
+      GST_BUFFER_DURATION(buffer.get()) = kInterval;
+      ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+      if (t < 7) {
+        EXPECT_EQ(0, latency_messages(bus)) << t;
+        EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness())) << t;
+      } else {
+        // The first has left.
+        if (t == 7) {
+          EXPECT_GE(latency_messages(bus), 1);
+        }
+        EXPECT_GE(gst_harness_query_latency(stream.harness()), 7 * kInterval) << t;
+      }
+    }
+    EXPECT_EQ(33u, stream.take_all().size());
+    gst_element_set_bus(element, nullptr);
+    gst_object_unref(bus);
+    gst_object_unref(element);
+  }
+}
+
+// What lies between two scenes is no frame's time.
+TEST(LatencyMessage, NoneForAJumpInTime) {
+  Stream stream("qdmdbackground method=qdmd window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24);
+  stream.push_many(0, 20);
+  EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness()));
+  stream.push_many(1000, 60);
+  EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness()));
+}
+
 TEST(LatencyMessage, OfAnotherWindowSizeComesWithTheNextStart) {
   GstElement* pipeline = gst_parse_launch(
       "videotestsrc num-buffers=20 ! video/x-raw,format=RGB,width=16,height=16,framerate=25/1 ! "

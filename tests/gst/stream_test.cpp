@@ -31,6 +31,33 @@ TEST_P(FrameCount, AllComeOutInOrderWithTheirTimestamps) {
 
 INSTANTIATE_TEST_SUITE_P(AroundTheWindow, FrameCount, testing::Values(1, 2, 7, 19, 20, 21, 47, 60));
 
+// Larger pictures that come fast are solved while others come, which the latency tells.
+TEST(FrameCount, OfWindowsThatAreSolvedBesideTheFrames) {
+  constexpr int kRate = 1000, kWindow = 20;
+  Stream stream("qdmdbackground window-size=20", GST_VIDEO_FORMAT_RGB, 160, 120, kRate);
+  std::vector<BufferPtr> frames;
+  for (int t = 0; t < 100; ++t) {
+    frames.push_back(stream.make_frame(t, paint_mover));
+    GST_BUFFER_PTS(frames.back().get()) = static_cast<GstClockTime>(t) * GST_SECOND / kRate;
+    GST_BUFFER_DURATION(frames.back().get()) = GST_SECOND / kRate;
+  }
+  const auto delay = static_cast<int>(
+      gst_util_uint64_scale(gst_harness_query_latency(stream.harness()), kRate, GST_SECOND));
+  EXPECT_GT(delay, kWindow - 1);
+  EXPECT_LT(delay, 2 * kWindow);
+  guint64 next = 0;
+  for (int t = 0; t < 100; ++t) {
+    ASSERT_EQ(GST_FLOW_OK,
+              gst_harness_push(stream.harness(), frames[static_cast<size_t>(t)].release()));
+    const auto out = stream.take_all();
+    ASSERT_EQ(t < delay ? 0u : 1u, out.size()) << t;
+    for (const auto& buffer : out) EXPECT_EQ(next++, GST_BUFFER_OFFSET(buffer.get()));
+  }
+  for (const auto& buffer : stream.take_to_end())
+    EXPECT_EQ(next++, GST_BUFFER_OFFSET(buffer.get()));
+  EXPECT_EQ(100u, next);
+}
+
 // A sink that has seen enough, or that is not there, is no error of ours, whoever feeds us.
 TEST(Downstream, MayEndInTheMiddleOfAWindow) {
   for (const char* launch :
