@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <initializer_list>
+
 namespace qdmd::test {
 namespace {
 
@@ -53,7 +56,7 @@ TEST(Latency, OfCapsWithTwiceTheRateOfTheFrames) {
 }
 
 TEST(Latency, OfTheRateThatTheCapsSayStaysWithTimestampsThatWaver) {
-  for (GstClockTime waver : {GstClockTime{0}, 1 * GST_MSECOND, 15 * GST_MSECOND}) {
+  for (GstClockTime waver : std::initializer_list<GstClockTime>{0, GST_MSECOND, 15 * GST_MSECOND}) {
     Latency latency;
     latency.configure(24, 25, 1);
     const GstClockTime promised = latency.promised();
@@ -132,7 +135,7 @@ TEST(Latency, FramesThatASolveHeldUp) {
   latency.configure(24, 25, 1);
   const GstClockTime waited = 24 * GST_SECOND / 25;
   frames_in(&latency, 0, 25, GST_SECOND / 25);
-  for (GstClockTime held : {GstClockTime{0}, 1 * GST_MSECOND, 20 * GST_MSECOND})
+  for (GstClockTime held : std::initializer_list<GstClockTime>{0, GST_MSECOND, 20 * GST_MSECOND})
     EXPECT_FALSE(latency.frame_out(0, held));
   EXPECT_EQ(waited, latency.promised());
   EXPECT_TRUE(latency.frame_out(0, 60 * GST_MSECOND));
@@ -162,8 +165,8 @@ TEST(Latency, IsNeverSoLongThatASumOverflows) {
   EXPECT_LT(latency.promised(), kMost);
   const GstClockTime first = latency.promised();
   // Frames as far apart as timestamps can be, and held for as long.
-  for (GstClockTime interval :
-       {GST_CLOCK_TIME_NONE / 1000, GST_CLOCK_TIME_NONE / 20, 2147483647 * GST_SECOND}) {
+  for (GstClockTime interval : std::initializer_list<GstClockTime>{
+           GST_CLOCK_TIME_NONE / 1000, GST_CLOCK_TIME_NONE / 20, 2147483647 * GST_SECOND}) {
     for (bool known : {false, true}) {
       latency.configure(2047, known ? 25 : 1, known ? 1 : 2147483647);
       const int count =
