@@ -126,6 +126,14 @@ Outcome run(const TrueClip& clip, const std::string& mode, double budget, int wi
   const std::unique_ptr<GstElement, void (*)(gpointer)> element(
       gst_harness_find_element(harness.get(), "qdmdbackground"), gst_object_unref);
   size_t received = 0;
+  const auto take = [&] {
+    while (GstBuffer* const picture = gst_harness_try_pull(harness.get())) {
+      if (received % kScored == 0)
+        outcome.errors.push_back(error_of(picture, clip.truths[received]));
+      gst_buffer_unref(picture);
+      ++received;
+    }
+  };
   for (size_t t = 0; t < clip.frames.size(); ++t) {
     if (t == loaded_from) load.emplace();
     GstBuffer* const buffer = buffer_of(clip.frames[t], t);
@@ -133,16 +141,13 @@ Outcome run(const TrueClip& clip, const std::string& mode, double budget, int wi
       if (gst_harness_push(harness.get(), buffer) != GST_FLOW_OK)
         throw std::runtime_error("qdmdbackground refuses a frame");
     }));
-    while (GstBuffer* const picture = gst_harness_try_pull(harness.get())) {
-      if (received % kScored == 0)
-        outcome.errors.push_back(error_of(picture, clip.truths[received]));
-      gst_buffer_unref(picture);
-      ++received;
-    }
+    take();
     if ((t + 1) % static_cast<size_t>(window) == 0)
       outcome.efforts.push_back(effort_of(element.get()));
   }
   load.reset();
+  gst_harness_push_event(harness.get(), gst_event_new_eos());
+  take();
   if (received != clip.frames.size()) throw std::runtime_error("qdmdbackground has lost frames");
   return outcome;
 }

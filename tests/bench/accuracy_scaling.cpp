@@ -142,6 +142,7 @@ void add_engine(Sweep* sweep, Method method, int frames, const Size& size) {
       for (int i = 0; i < 64; ++i) frame[rng() % frame.size() & ~size_t{3}] ^= 1;
       check(engine.push(view(static_cast<const uint8_t*>(frame.data()), ImageView())));
     }
+    check(engine.drain());
     while (engine.ready())
       engine.pop(Output::background, view(source->picture.data(), MutableImageView()));
   };

@@ -50,6 +50,7 @@ double time_of(const Size& size, int window, Solver solver) {
   check(engine.configure(options, size.width, size.height));
   const auto run = [&] {
     for (const auto& frame : frames) check(engine.push(view(frame.data(), ImageView())));
+    check(engine.drain());
     while (engine.ready()) engine.pop(Output::mask, view(picture.data(), MutableImageView()));
   };
   // A window before touches the memory; the adjoint does not care.

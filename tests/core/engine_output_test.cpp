@@ -63,6 +63,7 @@ TEST(EngineOutput, ThresholdTakesEffectAtOnce) {
   options.dmd.rank = 1;
   Strip strip(clip.pixels, options);
   for (const auto& frame : clip.frames) strip.push(frame);
+  strip.engine.drain();
   const auto white = [&] {
     const auto mask = strip.pop(Output::mask);
     return std::count(mask.begin(), mask.end(), uint8_t{255});
@@ -82,6 +83,9 @@ TEST(EngineOutput, ThresholdTakesEffectAtOnce) {
   strip.pop_all(Output::mask);
   for (const auto& frame : clip.frames) strip.push(frame);
   EXPECT_EQ(white(), 0) << "and stays for the next window";
+  EXPECT_FALSE(strip.engine.ready());
+  strip.engine.drain();
+  for (size_t t = 1; t < clip.size(); ++t) EXPECT_EQ(white(), 0) << t;
 }
 
 // ---- Layouts and alpha ----
@@ -102,6 +106,7 @@ TEST(EngineLayout, PaddingIsNeitherReadNorWritten) {
       picture->fill(still);
       ASSERT_TRUE(engine.push(picture->in()).ok());
     }
+    ASSERT_TRUE(engine.drain().ok());
     for (auto [bytes_per_pixel, with_alpha, padding] :
          {std::tuple(4, false, 12), std::tuple(3, false, 3), std::tuple(4, true, 5)}) {
       Picture out(width, height, bytes_per_pixel, with_alpha, padding);
@@ -191,10 +196,13 @@ TEST(EngineAlpha, PaddingIsOpaque) {
     Picture out(3, 3, 4, true);
     auto view = out.out();
     view.alpha_is_padding = true;
+    ASSERT_TRUE(engine.ready());
     engine.pop(output, view);
     for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
     if (output == Output::cutout) continue;
     // A frame without alpha is opaque in an output that has it.
+    ASSERT_TRUE(engine.drain().ok());
+    out = Picture(3, 3, 4, true);
     engine.pop(output, out.out());
     for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
   }
@@ -208,16 +216,26 @@ TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
   with_alpha.fill(random_picture(9, rng));
   plain.fill(random_picture(9, rng));
   for (size_t p = 0; p < 9; ++p) with_alpha.at(3, p) = alpha_of(0, p, true);
-  Picture out(3, 3, 4, true);
-  for (auto* picture : {&with_alpha, &plain}) {
-    engine.push(picture->in());
-    engine.push(picture->in());
+  // A window of each: the frames leave in the order in which they came.
+  int popped = 0;
+  const auto take = [&] {
     while (engine.ready()) {
+      Picture out(3, 3, 4, true);
       engine.pop(Output::background, out.out());
       for (size_t p = 0; p < 9; ++p)
-        EXPECT_EQ(out.at(3, p), picture == &plain ? 255 : alpha_of(0, p, true));
+        EXPECT_EQ(out.at(3, p), popped >= 2 ? 255 : alpha_of(0, p, true)) << popped;
+      ++popped;
     }
-  }
+  };
+  for (auto* picture : {&with_alpha, &plain})
+    for (int t = 0; t < 2; ++t) {
+      ASSERT_TRUE(engine.push(picture->in()).ok());
+      take();
+    }
+  EXPECT_EQ(popped, 3);
+  ASSERT_TRUE(engine.drain().ok());
+  take();
+  EXPECT_EQ(popped, 4);
 }
 
 TEST(EngineAlpha, InputPaddingIsNotTakenForAlpha) {
@@ -251,7 +269,9 @@ TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
         in.at(3, p) = static_cast<uint8_t>(varies ? 20 + p : 77 + t);
       ASSERT_TRUE(engine.push(in.in()).ok());
     }
+    ASSERT_TRUE(engine.drain().ok());
     for (size_t t = 0; t < count; ++t) {
+      ASSERT_TRUE(engine.ready());
       Picture out(static_cast<int>(pixels), 1, 4, true);
       engine.pop(Output::cutout, out.out());
       EXPECT_EQ(out.planes(), reference.cutout[t]);
@@ -276,7 +296,9 @@ TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
       const Outputs out(clip, options);
       Strip strip(clip.pixels, options);
       for (const auto& frame : clip.frames) ASSERT_TRUE(strip.push(frame).ok());
+      ASSERT_TRUE(strip.engine.drain().ok());
       for (size_t t = 0; t < clip.size(); ++t) {
+        ASSERT_TRUE(strip.engine.ready());
         std::vector<uint8_t> mask(clip.pixels), residual(clip.pixels);
         strip.engine.foreground(mask.data(), residual.data());
         for (size_t p = 0; p < clip.pixels; ++p) {
@@ -313,6 +335,18 @@ TEST(EngineOutput, WriteBackgroundIsThatOfTheNewestFrame) {
       EXPECT_EQ(there, engine.solves() > 0);
       while (engine.ready()) engine.pop(Output::background, last.out());
     }
+    if (mode == Mode::batch) {
+      ASSERT_EQ(engine.pending(), 11);
+      // The frames that wait have this background; asked for before each, it stays.
+      EXPECT_NE(newest.planes(), last.planes());
+      ASSERT_TRUE(engine.drain().ok());
+      while (engine.ready()) {
+        Picture again(width, 1);
+        EXPECT_TRUE(engine.write_background(again.out()));
+        EXPECT_EQ(newest.planes(), again.planes());
+        engine.pop(Output::background, last.out());
+      }
+    }
     EXPECT_EQ(newest.planes(), last.planes());
     engine.flush();
     EXPECT_FALSE(engine.write_background(newest.out()));
@@ -332,6 +366,9 @@ TEST(EngineOutput, ThreadsChangeNothingWhileFramesCome) {
       ASSERT_TRUE(changing.push(clip.frames[t]).ok());
       ASSERT_EQ(steady.pop_all(Output::background), changing.pop_all(Output::background)) << t;
     }
+    ASSERT_TRUE(steady.engine.drain().ok());
+    ASSERT_TRUE(changing.engine.drain().ok());
+    ASSERT_EQ(steady.pop_all(Output::background), changing.pop_all(Output::background));
   }
 }
 

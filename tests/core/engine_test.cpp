@@ -8,6 +8,8 @@
 namespace qdmd::test {
 namespace {
 
+using Pictures = std::vector<std::vector<uint8_t>>;
+
 // ---- Counts and order ----
 
 TEST(Engine, EveryFrameComesOutOnceAndInOrder) {
@@ -46,18 +48,33 @@ TEST(Engine, EveryFrameComesOutOnceAndInOrder) {
 TEST(Engine, PendingAndReadyFollowTheWindow) {
   std::mt19937 rng(112);
   Strip strip(10, window_of(4));
+  EXPECT_EQ(strip.engine.delay(), 3);
   for (int round = 0; round < 3; ++round) {
-    for (int t = 0; t < 4; ++t) {
+    for (int t = 0; t < 11; ++t) {
+      SCOPED_TRACE(t);
       EXPECT_FALSE(strip.engine.ready());
-      EXPECT_EQ(strip.engine.pending(), t);
+      EXPECT_EQ(strip.engine.pending(), std::min(t, 3));
       ASSERT_TRUE(strip.push(random_picture(10, rng)).ok());
+      EXPECT_EQ(strip.engine.pending(), std::min(t + 1, 4));
+      // From the fourth on, one leaves for each that comes; its window was solved with the last
+      // frame of it.
+      ASSERT_EQ(strip.engine.ready(), t >= 3);
+      if (t >= 3) strip.pop(Output::background);
+      EXPECT_FALSE(strip.engine.ready());
+      EXPECT_EQ(strip.engine.solves(), static_cast<uint64_t>(3 * round + (t + 1) / 4));
+      // The last frame of a window leaves with the third of the next.
+      EXPECT_EQ(strip.engine.frames_left(), t < 3 ? 0 : 3 - (t - 3) % 4);
     }
-    for (int t = 4; t > 0; --t) {
+    // The window of frames 8 to 10 is not full: it ends with the frames before it.
+    ASSERT_TRUE(strip.engine.drain().ok());
+    for (int t = 3; t > 0; --t) {
       EXPECT_TRUE(strip.engine.ready());
       EXPECT_EQ(strip.engine.pending(), t);
       strip.pop(Output::background);
+      EXPECT_EQ(strip.engine.frames_left(), t - 1);
     }
-    EXPECT_EQ(strip.engine.solves(), static_cast<uint64_t>(round + 1));
+    EXPECT_FALSE(strip.engine.ready());
+    EXPECT_EQ(strip.engine.solves(), static_cast<uint64_t>(3 * round + 3));
   }
 }
 
@@ -108,7 +125,10 @@ TEST(Engine, FlushForgets) {
   ASSERT_TRUE(strip.engine.ready());
   EXPECT_EQ(strip.pop(Output::background), still);
   // With frames ready.
+  strip.engine.drain();
+  EXPECT_TRUE(strip.engine.ready());
   strip.engine.flush();
+  EXPECT_EQ(strip.engine.pending(), 0);
   EXPECT_FALSE(strip.engine.ready());
   EXPECT_TRUE(strip.push(still).ok());
   strip.engine.drain();
@@ -126,8 +146,11 @@ TEST(Engine, ConfigureStartsAfresh) {
   EXPECT_EQ(strip.engine.report().window_frames, 0);
   const auto still = random_picture(5, rng);
   strip.push(still);
+  EXPECT_FALSE(strip.engine.ready());
   strip.push(still);
-  EXPECT_EQ(strip.pop_all(Output::background), (std::vector{still, still}));
+  EXPECT_EQ(strip.pop_all(Output::background), (Pictures{still}));
+  strip.engine.drain();
+  EXPECT_EQ(strip.pop_all(Output::background), (Pictures{still}));
 }
 
 // ---- Refusals ----
@@ -153,7 +176,12 @@ TEST(EngineStatus, PushWhileFramesAreWaiting) {
   EXPECT_FALSE(status.ok());
   EXPECT_FALSE(status.message.empty());
   EXPECT_EQ(strip.engine.pending(), 3);
-  EXPECT_EQ(strip.pop_all(Output::background), undisturbed.run(clip, Output::background));
+  const auto expected = undisturbed.run(clip, Output::background);
+  EXPECT_EQ(strip.pop_all(Output::background), (Pictures{expected[0]}));
+  strip.engine.drain();
+  EXPECT_EQ(strip.push(clip.frames[0]).code, Status::Code::frames_are_waiting) << "drained";
+  EXPECT_EQ(strip.engine.pending(), 2);
+  EXPECT_EQ(strip.pop_all(Output::background), (Pictures{expected[1], expected[2]}));
   EXPECT_TRUE(strip.push(clip.frames[0]).ok());
 }
 

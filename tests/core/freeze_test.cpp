@@ -128,6 +128,10 @@ TEST(FreezeLive, EveryOtherFrameIsStillOnePictureEach) {
 
 // ---- Batch ----
 
+void take(Strip* strip, Pictures* out) {
+  for (auto& picture : strip->pop_all(Output::background)) out->push_back(std::move(picture));
+}
+
 TEST(FreezeBatch, FromTheNextWindowOn) {
   std::mt19937 rng(341);
   // An infinite threshold takes all modes: too many for pictures, L(t) combines frames.
@@ -143,11 +147,16 @@ TEST(FreezeBatch, FromTheNextWindowOn) {
         if (t == 10 + asked_at) strip.engine.set_freeze(true);
         if (t == 34) strip.engine.set_freeze(false);
         ASSERT_TRUE(strip.push(clip.frames[t]).ok());
-        for (auto& picture : strip.pop_all(Output::background)) out.push_back(std::move(picture));
-        if (t == 39) {
+        take(&strip, &out);
+        ASSERT_EQ(out.size(), t < 9 ? 0 : t - 8);
+        // Its window's first frame leaves with its last: from then on a solve counts.
+        if (t == 39 || t == 48) {
           EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 1u : 2u);
         }
       }
+      EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 2u : 3u);
+      strip.engine.drain();
+      take(&strip, &out);
       ASSERT_EQ(out.size(), clip.size());
       // Asked for in the middle of a window: that one is solved to its end.
       const size_t begin = asked_at == 0 ? 10 : 20;
@@ -177,20 +186,36 @@ TEST(FreezeBatch, DrainGivesTheRemainderAgainstTheFrozenPicture) {
   std::mt19937 rng(343);
   const Clip clip = moving_box_clip(100, 24, 20, rng);
   for (size_t rest : {1, 5, 7}) {
-    Strip strip(100, window_of(8));
-    for (size_t t = 0; t < 8; ++t) strip.push(clip.frames[t]);
-    strip.pop_all(Output::background);
-    strip.engine.set_freeze(true);
-    for (size_t t = 8; t < 8 + rest; ++t) strip.push(clip.frames[t]);
-    EXPECT_FALSE(strip.engine.ready());
+    Strip strip(100, window_of(8)), undisturbed(100, window_of(8));
+    const auto learned = undisturbed.run(part_of(clip, 0, 8), Output::background);
+    Pictures out;
+    for (size_t t = 0; t < 8 + rest; ++t) {
+      strip.engine.set_freeze(t >= 8);
+      ASSERT_TRUE(strip.push(clip.frames[t]).ok());
+      take(&strip, &out);
+    }
+    ASSERT_EQ(out.size(), 1 + rest);
+    EXPECT_EQ(strip.engine.pending(), 7);
     strip.engine.drain();
-    const auto out = strip.pop_all(Output::background);
-    ASSERT_EQ(out.size(), rest);
-    for (const auto& picture : out) EXPECT_EQ(picture, out[0]);
+    take(&strip, &out);
+    ASSERT_EQ(out.size(), 8 + rest);
+    for (size_t t = 0; t < 8; ++t) EXPECT_EQ(out[t], learned[t]) << t;
+    const auto frozen = out[8];
+    expect_nearly_equal(frozen, out[7]);
+    for (size_t t = 8; t < 8 + rest; ++t) EXPECT_EQ(out[t], frozen) << t;
     EXPECT_EQ(strip.engine.solves(), 1u);
     // Time is broken; it is still frozen.
-    for (size_t t = 10; t < 18; ++t) strip.push(clip.frames[t]);
-    for (const auto& picture : strip.pop_all(Output::background)) EXPECT_EQ(picture, out[0]);
+    out.clear();
+    for (size_t t = 10; t < 18; ++t) {
+      ASSERT_TRUE(strip.push(clip.frames[t]).ok());
+      take(&strip, &out);
+      EXPECT_EQ(out.size(), t < 17 ? 0u : 1u);
+    }
+    strip.engine.drain();
+    take(&strip, &out);
+    ASSERT_EQ(out.size(), 8u);
+    for (const auto& picture : out) EXPECT_EQ(picture, frozen);
+    EXPECT_EQ(strip.engine.solves(), 1u);
     // And learns from its own frames alone.
     strip.engine.set_freeze(false);
     Strip fresh(100, window_of(8));
@@ -212,8 +237,11 @@ TEST(FreezeBatch, LongWindowsWhoseGroupsRunBeside) {
     for (size_t t = 0; t < 160; ++t) {
       strip.engine.set_freeze(t >= 50 && t < 90);
       strip.push(clip.frames[t]);
-      for (auto& picture : strip.pop_all(Output::background)) out.push_back(std::move(picture));
+      take(&strip, &out);
+      ASSERT_EQ(out.size(), t < 39 ? 0 : t - 38);
     }
+    strip.engine.drain();
+    take(&strip, &out);
     ASSERT_EQ(out.size(), 160u);
     for (size_t t = 0; t < 160; ++t) {
       if (t < 80 || t >= 120) {

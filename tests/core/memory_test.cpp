@@ -25,6 +25,7 @@ struct Case {
   Mode mode = Mode::batch;
   Alpha alpha = Alpha::none;
   int width = 320, height = 240, window = 100, threads = 1;
+  double rate = 0;  // frames per second: known, some come while a window is solved
 };
 
 EngineOptions options_of(const Case& c) {
@@ -34,6 +35,7 @@ EngineOptions options_of(const Case& c) {
   options.mode = c.mode;
   options.window_size = c.window;
   options.threads = c.threads;
+  options.frame_rate = c.rate;
   return options;
 }
 
@@ -44,7 +46,8 @@ std::string describe(const Case& c) {
   if (c.method == Method::qdmd) name += std::string("/") + name_of(c.solver);
   return name + (c.mode == Mode::live ? " live " : " batch ") + std::to_string(c.width) + "x" +
          std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
-         std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)];
+         std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)] +
+         (c.rate > 0 ? ", solved beside" : "");
 }
 
 // A light that goes up and down, something that moves, and noise, which makes the frames linearly
@@ -159,6 +162,28 @@ void check_all(Method method, Solver solver, std::initializer_list<Size> sizes) 
 TEST(Memory, OfTheDefault) {
   check_all(Method::robust, Solver::gram,
             {{320, 240, 100}, {64, 48, 50}, {640, 480, 12}, {100, 80, 30}, {200, 150, 60}});
+}
+
+// Windows that are solved while frames come: they keep more frames, and two models.
+TEST(Memory, OfTheDefaultSolvedBeside) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (const Size& size : {Size{320, 240, 100}, Size{64, 48, 50}, Size{640, 480, 12},
+                           Size{100, 80, 30}, Size{200, 150, 60}})
+    for (Alpha alpha : {Alpha::none, Alpha::constant, Alpha::varying})
+      for (int threads : {1, 2, 4})
+        for (double rate : {100.0, 1e4}) {
+          if (!asked_for("QDMD_LONG") && (alpha == Alpha::constant || threads == 2 ||
+                                          (threads == 1) != (alpha == Alpha::none)))
+            continue;
+          Case c{Method::robust, Solver::gram, Mode::batch, alpha,
+                 size.width,     size.height,  size.window, threads};
+          c.rate = rate;
+          if (layout_of(options_of(c), c.width, c.height).late_frames == 0) {
+            EXPECT_LT(rate, 1e4) << describe(c);
+            continue;
+          }
+          check(c);
+        }
 }
 
 TEST(Memory, OfQdmd) {

@@ -40,6 +40,8 @@ EngineOptions options_of(const Case& c) {
   options.window_size = kWindow;
   options.hop_size = kHop;
   options.threads = c.threads;
+  // Windows are solved beside the frames that follow.
+  if (c.mode == Mode::batch && c.threads > 1) options.frame_rate = 1e6;
   return options;
 }
 
@@ -365,6 +367,9 @@ std::optional<int64_t> run(const Trial& trial, const std::vector<std::vector<uin
 }
 
 void check(const Case& c) {
+  if (c.mode == Mode::batch) {
+    EXPECT_EQ(layout_of(options_of(c), kWidth, kHeight).late_frames > 0, c.threads > 1);
+  }
   const auto right = [&] {
     Engine engine;
     Owner owner(c, &engine);
@@ -417,6 +422,9 @@ std::vector<Case> cases() {
   for (Solver solver : {Solver::gram, Solver::gram_extended, Solver::qr, Solver::adjoint})
     add(Method::qdmd, solver);
   add(Method::dmd, Solver::gram);
+  if (!kLongTrials)
+    for (Method method : {Method::robust, Method::qdmd})
+      all.push_back({method, Solver::gram, Mode::batch, Output::mask, 3, Alpha::varying});
   return all;
 }
 

@@ -94,8 +94,10 @@ Score separate(const char* text, const DmdOptions& dmd, uint64_t seed) {
     for (Engine* engine : {&backgrounds, &masks})
       EXPECT_TRUE(engine->push(view_of<const uint8_t>(frame)).ok());
   }
+  for (Engine* engine : {&backgrounds, &masks}) EXPECT_TRUE(engine->drain().ok());
   double hits = 0, objects = 0, alarms = 0;
   for (size_t t = 0; t < kFrames; ++t) {
+    EXPECT_TRUE(backgrounds.ready() && masks.ready());
     Picture picture(kWidth, kHeight);
     backgrounds.pop(Output::background, view_of<uint8_t>(picture));
     const double error = mean_difference(picture, truths[t]);

@@ -325,20 +325,27 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     }
     Outcome outcome;
     Picture out(kSide, kSide);
-    for (int t = 0; t < count; ++t) {
+    const auto timed = [&](const auto& work) {
       const auto start = std::chrono::steady_clock::now();
-      EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in()).ok());
-      int ready = 0;
-      for (; engine.ready(); ++ready) {
-        engine.pop(Output::background, out.out());
-        outcome.pictures.push_back({});
-      }
+      work();
       outcome.seconds +=
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    };
+    const auto take = [&] {
+      while (engine.ready()) {
+        timed([&] { engine.pop(Output::background, out.out()); });
+        outcome.pictures.push_back(out.planes());
+      }
+    };
+    for (int t = 0; t < count; ++t) {
+      timed([&] { EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in()).ok()); });
+      take();
+      EXPECT_EQ(engine.pending(), std::min(t + 1, engine.delay()));
       engine.clock().charge(Clock::frames, kBeside);
-      if (ready > 0) outcome.pictures.back() = out.planes();
       if (engine.solves() > outcome.reports.size()) outcome.reports.push_back(engine.report());
     }
+    timed([&] { EXPECT_TRUE(engine.drain().ok()); });
+    take();
     outcome.solves = engine.solves();
     outcome.model = engine.time_budget();
     outcome.spent = engine.clock().spent();
@@ -465,20 +472,28 @@ TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
 // Who lets go of a frozen background has another one at once, in the light that there is.
 TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
   constexpr int kWindow = 10;
+  const auto light = [](int frame) { return std::max(0.6, 1 - 0.04 * frame); };
   Separator separator(Mode::batch, kWindow);
   separator.engine.set_time_budget(1e-9);
-  for (int t = 0; t < 8 * kWindow; ++t) {
-    separator.engine.set_freeze(t >= kWindow && t < 3 * kWindow);
-    const double light = std::max(0.6, 1 - 0.04 * t);
-    separator.push(light);
-    while (separator.engine.ready()) {
-      const double error = separator.pop(light);
+  int popped = 0;
+  const auto take = [&] {
+    for (; separator.engine.ready(); ++popped) {
+      const double error = separator.pop(light(popped));
       // From there on the light does not change.
-      if (t >= 3 * kWindow) {
-        EXPECT_LE(error, 1.5) << "frame " << t;
+      if (popped >= 3 * kWindow) {
+        EXPECT_LE(error, 1.5) << "frame " << popped;
       }
     }
+  };
+  for (int t = 0; t < 8 * kWindow; ++t) {
+    separator.engine.set_freeze(t >= kWindow && t < 3 * kWindow);
+    separator.push(light(t));
+    take();
+    EXPECT_EQ(popped, std::max(0, t + 2 - kWindow));
   }
+  EXPECT_TRUE(separator.engine.drain().ok());
+  take();
+  EXPECT_EQ(popped, 8 * kWindow);
   EXPECT_EQ(separator.engine.solves(), 2u);
 }
 
@@ -489,12 +504,20 @@ TEST(BudgetOfBatch, ABackgroundThatIsKeptFollowsTheLight) {
   const auto light = [](int frame) { return frame < kWindow ? 1 : 1 - frame / 100.0; };
   Separator separator(Mode::batch, kWindow);
   separator.engine.set_time_budget(1e-9);
+  int popped = 0;
+  const auto take = [&] {
+    // Both roundings, and the gain's.
+    for (; separator.engine.ready(); ++popped)
+      EXPECT_LE(separator.pop(light(popped)), 1.5) << "frame " << popped;
+  };
   for (int t = 0; t < 4 * kWindow; ++t) {
     separator.push(light(t));
-    // Both roundings, and the gain's.
-    for (int k = t + 1 - kWindow; separator.engine.ready(); ++k)
-      EXPECT_LE(separator.pop(light(k)), 1.5) << "frame " << k;
+    take();
+    EXPECT_EQ(popped, std::max(0, t + 2 - kWindow));
   }
+  EXPECT_TRUE(separator.engine.drain().ok());
+  take();
+  EXPECT_EQ(popped, 4 * kWindow);
   EXPECT_EQ(separator.engine.solves(), 1u);
 }
 

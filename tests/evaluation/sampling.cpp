@@ -26,6 +26,7 @@ std::vector<cv::Mat> backgrounds(const Clip& clip, int rank, int sample_step) {
   Status status = engine.configure(options, size.width, size.height);
   for (const cv::Mat& frame : clip.frames)
     if (status.ok()) status = engine.push(view_of(frame));
+  if (status.ok()) status = engine.drain();
   if (!status.ok()) throw std::runtime_error(status.message);
   std::vector<cv::Mat> result;
   while (engine.ready()) {

@@ -106,6 +106,13 @@ class Stream {
     return out;
   }
 
+  // What came out and was not taken, and all that waits.
+  // Nothing may be pushed after it.
+  std::vector<BufferPtr> take_to_end() {
+    EXPECT_TRUE(eos());
+    return take_all();
+  }
+
   // Calls see(x, y, rgb, alpha) for every pixel of an output buffer.
   void each_pixel(GstBuffer* buffer,
                   const std::function<void(int, int, const uint8_t*, int)>& see) const {

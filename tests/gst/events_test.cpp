@@ -24,12 +24,20 @@ class HalfAWindow : public testing::Test {
       EXPECT_EQ(static_cast<GstClockTime>(t) * kFrame,
                 GST_BUFFER_PTS(out[static_cast<size_t>(t - first)].get()));
   }
-  // A new window begins with frame `first`: it is full after kWindow frames, not before.
+  // A new window begins with frame `first`: it is full after kWindow frames, not before, and from
+  // then on a frame leaves for each that comes. At the end, the rest.
   void expect_new_window(int first) {
     stream_.push_many(first, kWindow - 1);
     expect_frames(first, first);
-    stream_.push_many(first + kWindow - 1, 1);
-    expect_frames(first, first + kWindow);
+    for (int t = first; t < first + kWindow + 3; ++t) {
+      stream_.push_many(t + kWindow - 1, 1);
+      expect_frames(t, t + 1);
+    }
+    expect_rest(first + kWindow + 3, first + 2 * kWindow + 2);
+  }
+  void expect_rest(int first, int end) {
+    EXPECT_TRUE(stream_.eos());
+    expect_frames(first, end);
   }
   static GstSegment segment_from(GstClockTime start, double rate = 1) {
     GstSegment segment;
@@ -95,8 +103,11 @@ TEST_F(HalfAWindow, AJumpForwardsInTimeSendsItFirst) {
   expect_frames(0, 0);
   stream_.push_many(3 + 25 * 2, 1);
   expect_frames(0, 3);
-  stream_.push_many(54, kWindow - 1);
-  expect_frames(53, 53 + kWindow);
+  stream_.push_many(54, kWindow - 2);
+  expect_frames(53, 53);
+  stream_.push_many(52 + kWindow, 1);
+  expect_frames(53, 54);
+  expect_rest(54, 53 + kWindow);
 }
 
 TEST_F(HalfAWindow, AJumpBackInTimeSendsItFirst) {
@@ -105,8 +116,12 @@ TEST_F(HalfAWindow, AJumpBackInTimeSendsItFirst) {
 }
 
 TEST_F(HalfAWindow, FramesThatACameraLostLeaveItAsItIs) {
-  stream_.push_many(3 + 20, kWindow - 3);
-  EXPECT_EQ(static_cast<size_t>(kWindow), stream_.take_all().size());
+  stream_.push_many(3 + 20, kWindow - 4);
+  expect_frames(0, 0);
+  stream_.push_many(3 + 20 + kWindow - 4, 1);
+  expect_frames(0, 1);
+  EXPECT_TRUE(stream_.eos());
+  EXPECT_EQ(static_cast<size_t>(kWindow - 1), stream_.take_all().size());
 }
 
 TEST_F(HalfAWindow, TimestampsThatAreRoundedLeaveItAsItIs) {
@@ -114,8 +129,11 @@ TEST_F(HalfAWindow, TimestampsThatAreRoundedLeaveItAsItIs) {
     auto buffer = stream_.make_frame(t, paint_mover);
     GST_BUFFER_PTS(buffer.get()) += t % 2 ? 9 * GST_MSECOND : 0;
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+    if (t < kWindow - 1) expect_frames(0, 0);
   }
-  EXPECT_EQ(static_cast<size_t>(kWindow), stream_.take_all().size());
+  expect_frames(0, 1);
+  EXPECT_TRUE(stream_.eos());
+  EXPECT_EQ(static_cast<size_t>(kWindow - 1), stream_.take_all().size());
 }
 
 TEST_F(HalfAWindow, FramesWithoutTimestampsLeaveItAsItIs) {
@@ -123,11 +141,13 @@ TEST_F(HalfAWindow, FramesWithoutTimestampsLeaveItAsItIs) {
     auto buffer = stream_.make_frame(t, paint_mover);
     GST_BUFFER_PTS(buffer.get()) = GST_CLOCK_TIME_NONE;
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+    if (t < kWindow - 1) expect_frames(0, 0);
   }
-  const auto out = stream_.take_all();
-  ASSERT_EQ(static_cast<size_t>(kWindow), out.size());
-  EXPECT_EQ(2 * kFrame, GST_BUFFER_PTS(out[2].get()));
-  EXPECT_FALSE(GST_BUFFER_PTS_IS_VALID(out[3].get()));
+  expect_frames(0, 1);
+  const auto out = stream_.take_to_end();
+  ASSERT_EQ(static_cast<size_t>(kWindow - 1), out.size());
+  EXPECT_EQ(2 * kFrame, GST_BUFFER_PTS(out[1].get()));
+  for (size_t i = 2; i < out.size(); ++i) EXPECT_FALSE(GST_BUFFER_PTS_IS_VALID(out[i].get())) << i;
 }
 
 TEST_F(HalfAWindow, FlushDropsIt) {
@@ -144,9 +164,12 @@ TEST_F(HalfAWindow, ReversePlaybackBeginsANewOne) {
   expect_frames(0, 3);
   // Time runs back within it, which is no jump.
   for (int t = 40; t > 40 - kWindow; --t) ASSERT_EQ(GST_FLOW_OK, stream_.push(t));
-  const auto out = stream_.take_all();
+  auto out = stream_.take_all();
+  ASSERT_EQ(1u, out.size());
+  for (auto& buffer : stream_.take_to_end()) out.push_back(std::move(buffer));
   ASSERT_EQ(static_cast<size_t>(kWindow), out.size());
-  EXPECT_EQ(40 * kFrame, GST_BUFFER_PTS(out[0].get()));
+  for (size_t i = 0; i < out.size(); ++i)
+    EXPECT_EQ((40 - i) * kFrame, GST_BUFFER_PTS(out[i].get())) << i;
 }
 
 TEST_F(HalfAWindow, AnotherPlaybackRateBeginsANewOne) {
@@ -171,8 +194,11 @@ TEST_F(HalfAWindow, TagsAndCustomEventsPassAtOnce) {
 
 TEST_F(HalfAWindow, ReconfigureLeavesItAsItIs) {
   gst_harness_push_upstream_event(stream_.harness(), gst_event_new_reconfigure());
-  stream_.push_many(3, kWindow - 3);
-  expect_frames(0, kWindow);
+  stream_.push_many(3, kWindow - 4);
+  expect_frames(0, 0);
+  stream_.push_many(kWindow - 1, 1);
+  expect_frames(0, 1);
+  expect_rest(1, kWindow);
 }
 
 // Nothing of upstream's is held, so there is nothing to give back.
@@ -182,8 +208,11 @@ TEST_F(HalfAWindow, DrainQueryIsAnswered) {
   EXPECT_TRUE(gst_pad_query(pad, query));
   gst_object_unref(pad);
   gst_query_unref(query);
-  stream_.push_many(3, kWindow - 3);
-  expect_frames(0, kWindow);
+  stream_.push_many(3, kWindow - 4);
+  expect_frames(0, 0);
+  stream_.push_many(kWindow - 1, 1);
+  expect_frames(0, 1);
+  expect_rest(1, kWindow);
 }
 
 TEST_F(HalfAWindow, AllocationQueryAsksForNoBuffers) {
@@ -222,10 +251,12 @@ TEST(Pools, OfTwoBuffersUpstreamDoNotStall) {
     stream.stamp(buffer, t);
     stream.fill(buffer, t, paint_mover);
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer));
-    out += stream.take_all().size();
+    const size_t now = stream.take_all().size();
+    ASSERT_EQ(t < 99 ? 0u : 1u, now) << t;
+    out += now;
   }
-  ASSERT_TRUE(stream.eos());
-  out += stream.take_all().size();
+  EXPECT_EQ(151u, out);
+  out += stream.take_to_end().size();
   EXPECT_EQ(250u, out);
   gst_buffer_pool_set_active(pool, FALSE);
   gst_object_unref(pool);
@@ -261,6 +292,46 @@ TEST(LatencyMessage, IsPostedOnceForEachChange) {
   gst_element_set_bus(element, nullptr);
   gst_object_unref(bus);
   gst_object_unref(element);
+}
+
+// Frames of 10 a second, whatever the caps say.
+TEST(LatencyMessage, IsPostedWhereFramesComeMoreSlowlyThanTheCapsSay) {
+  constexpr GstClockTime kInterval = GST_SECOND / 10;
+  for (int rate : {0, 25}) {
+    Stream stream("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24, rate);
+    GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+    GstBus* bus = gst_bus_new();
+    gst_element_set_bus(element, bus);
+    for (int t = 0; t < 40; ++t) {
+      auto buffer = stream.make_frame(t, paint_mover);
+      GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(t) * kInterval;
+      GST_BUFFER_DURATION(buffer.get()) = kInterval;
+      ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
+      if (t < 7) {
+        EXPECT_EQ(0, latency_messages(bus)) << t;
+        EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness())) << t;
+      } else {
+        // The first has left.
+        if (t == 7) {
+          EXPECT_GE(latency_messages(bus), 1);
+        }
+        EXPECT_GE(gst_harness_query_latency(stream.harness()), 7 * kInterval) << t;
+      }
+    }
+    EXPECT_EQ(33u, stream.take_all().size());
+    gst_element_set_bus(element, nullptr);
+    gst_object_unref(bus);
+    gst_object_unref(element);
+  }
+}
+
+// What lies between two scenes is no frame's time.
+TEST(LatencyMessage, NoneForAJumpInTime) {
+  Stream stream("qdmdbackground method=qdmd window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24);
+  stream.push_many(0, 20);
+  EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness()));
+  stream.push_many(1000, 60);
+  EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness()));
 }
 
 TEST(LatencyMessage, OfAnotherWindowSizeComesWithTheNextStart) {

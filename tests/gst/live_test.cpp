@@ -209,16 +209,24 @@ TEST(Freeze, InBatchFromTheNextWindowOn) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
   Background element(stream);
   stream.push_many(0, 7);
+  EXPECT_EQ(1u, element.stat("solves"));
   element.set("freeze", TRUE);
   stream.push_many(7, 13);
-  const auto out = stream.take_all();
-  ASSERT_EQ(20u, out.size());
+  auto out = stream.take_all();
+  ASSERT_EQ(16u, out.size());
   EXPECT_EQ(2u, element.stat("solves"));
+  element.set("freeze", FALSE);
+  stream.push_many(20, 4);
+  EXPECT_EQ(2u, element.stat("solves"));
+  stream.push_many(24, 1);
+  EXPECT_EQ(3u, element.stat("solves"));
+  for (auto& buffer : stream.take_all()) out.push_back(std::move(buffer));
+  ASSERT_EQ(21u, out.size());
+  for (size_t t = 0; t < 21; ++t) EXPECT_EQ(t * kFrame, GST_BUFFER_PTS(out[t].get()));
   const auto frozen = bytes_of(out[10].get());
   for (size_t t = 10; t < 20; ++t) EXPECT_EQ(frozen, bytes_of(out[t].get())) << t;
-  element.set("freeze", FALSE);
-  stream.push_many(20, 5);
-  EXPECT_EQ(5u, stream.take_all().size());
+  ASSERT_TRUE(stream.eos());
+  EXPECT_EQ(4u, stream.take_all().size());
   EXPECT_EQ(3u, element.stat("solves"));
 }
 
@@ -264,16 +272,22 @@ TEST(Reset, SendsWhatWaitsInABatchFirst) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
   Background element(stream);
   stream.push_many(0, 8);
-  EXPECT_EQ(5u, stream.take_all().size());
+  EXPECT_EQ(4u, stream.take_all().size());
   element.reset();
   EXPECT_TRUE(stream.take_all().empty()) << "not before the next frame";
   ASSERT_EQ(GST_FLOW_OK, stream.push(8, kWhite));
   auto out = stream.take_all();
-  ASSERT_EQ(3u, out.size());
-  for (size_t i = 0; i < 3; ++i) EXPECT_EQ((5 + i) * kFrame, GST_BUFFER_PTS(out[i].get()));
-  stream.push_many(9, 4, kWhite);
+  ASSERT_EQ(4u, out.size());
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ((4 + i) * kFrame, GST_BUFFER_PTS(out[i].get()));
+  stream.push_many(9, 3, kWhite);
+  EXPECT_TRUE(stream.take_all().empty()) << "a new window";
+  stream.push_many(12, 1, kWhite);
   out = stream.take_all();
+  ASSERT_EQ(1u, out.size());
+  ASSERT_TRUE(stream.eos());
+  for (auto& buffer : stream.take_all()) out.push_back(std::move(buffer));
   ASSERT_EQ(5u, out.size());
+  for (size_t i = 0; i < 5; ++i) EXPECT_EQ((8 + i) * kFrame, GST_BUFFER_PTS(out[i].get()));
   for (const auto& buffer : out)
     EXPECT_EQ(0, apart(bytes_of(buffer.get()), frame_bytes(stream, 0, kWhite), 0));
 }

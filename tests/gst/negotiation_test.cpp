@@ -34,7 +34,7 @@ std::vector<int> run_clip(const char* output, GstVideoFormat format, int width, 
     EXPECT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
   }
   std::vector<int> seen;
-  for (const auto& buffer : stream.take_all())
+  for (const auto& buffer : stream.take_to_end())
     stream.each_pixel(buffer.get(), [&](int x, int, const uint8_t* p, int alpha) {
       seen.insert(seen.end(), p, p + 3);
       if (alpha < 0) return;
@@ -79,7 +79,9 @@ TEST(Outputs, CutoutIsTransparentOutsideTheMask) {
   Stream stream("qdmdbackground window-size=8 output=cutout", GST_VIDEO_FORMAT_BGRA, 40, 24);
   stream.push_many(0, 8);
   int shown = 0, hidden = 0;
-  for (const auto& buffer : stream.take_all())
+  const auto out = stream.take_to_end();
+  ASSERT_EQ(8u, out.size());
+  for (const auto& buffer : out)
     stream.each_pixel(buffer.get(), [&](int, int, const uint8_t* p, int alpha) {
       if (alpha == 0) {
         ++hidden;
@@ -95,10 +97,15 @@ TEST(Outputs, CutoutIsTransparentOutsideTheMask) {
 TEST(Outputs, ChangeWhilePlaying) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
   stream.push_many(0, 5);
-  stream.take_all();
+  EXPECT_EQ(1u, stream.take_all().size());
   gst_harness_set(stream.harness(), "qdmdbackground", "output", 2, nullptr);
   stream.push_many(5, 5);
-  for (const auto& buffer : stream.take_all())
+  // From the next frame that leaves, which waited.
+  auto out = stream.take_all();
+  ASSERT_EQ(5u, out.size());
+  for (auto& buffer : stream.take_to_end()) out.push_back(std::move(buffer));
+  ASSERT_EQ(9u, out.size());
+  for (const auto& buffer : out)
     stream.each_pixel(buffer.get(), [](int, int, const uint8_t* p, int) {
       ASSERT_TRUE(p[0] == 0 || p[0] == 255);
     });
@@ -169,6 +176,50 @@ TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {
       &domain, &code);
   EXPECT_EQ(GST_RESOURCE_ERROR, domain);
   EXPECT_NE(std::string::npos, text.find("solver=gram")) << text;
+}
+
+// What the next such message says; "" where there is none.
+std::string next_text(GstBus* bus, GstMessageType type) {
+  GstMessage* message = gst_bus_pop_filtered(bus, type);
+  if (!message) return "";
+  GError* error = nullptr;
+  if (type == GST_MESSAGE_ERROR)
+    gst_message_parse_error(message, &error, nullptr);
+  else
+    gst_message_parse_warning(message, &error, nullptr);
+  const std::string text = error->message;
+  g_error_free(error);
+  gst_message_unref(message);
+  return text;
+}
+
+TEST(Limits, InterlacedVideoIsRefusedWithTheWayOut) {
+  for (GstVideoInterlaceMode mode :
+       {GST_VIDEO_INTERLACE_MODE_INTERLEAVED, GST_VIDEO_INTERLACE_MODE_MIXED}) {
+    Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 16, 16);
+    stream.push_many(0, 3);
+    GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+    GstBus* bus = gst_bus_new();
+    gst_element_set_bus(element, bus);
+    GstVideoInfo info = stream.info();
+    GST_VIDEO_INFO_INTERLACE_MODE(&info) = mode;
+    gst_harness_set_src_caps(stream.harness(), gst_video_info_to_caps(&info));
+    EXPECT_NE(GST_FLOW_OK, stream.push(3));
+    const std::string text = next_text(bus, GST_MESSAGE_ERROR);
+    EXPECT_NE(std::string::npos, text.find("deinterlace")) << text;
+    EXPECT_EQ(3u, stream.take_all().size()) << "frames before are sent all the same";
+    gst_element_set_bus(element, nullptr);
+    gst_object_unref(bus);
+    gst_object_unref(element);
+  }
+}
+
+TEST(Limits, AHopLongerThanTheWindowIsNothingToABatch) {
+  GQuark domain = 0;
+  int code = 0;
+  EXPECT_EQ("", first_word("videotestsrc num-buffers=9 ! qdmdbackground window-size=5 hop-size=6 ! "
+                           "fakesink",
+                           &domain, &code));
 }
 
 TEST(Pipelines, ALiveSourceEndsWithoutDroppingFrames) {
@@ -325,6 +376,86 @@ TEST(Settings, WithoutEffectHaveNone) {
   EXPECT_EQ(pictures_of(""), pictures_of("amplitude=first-frame"));
   EXPECT_EQ(pictures_of("method=qdmd"), pictures_of("method=qdmd iterations=4"));
   EXPECT_EQ(pictures_of("method=dmd"), pictures_of("method=dmd solver=qr iterations=2"));
+}
+
+TEST(Settings, ThatWaitForTheNextStartAreWarnedOfWhilePlaying) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 16, 16);
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  GstBus* bus = gst_bus_new();
+  gst_element_set_bus(element, bus);
+  const auto warning_of = [&](const char* name, const char* value) {
+    gst_util_set_object_arg(G_OBJECT(element), name, value);
+    return next_text(bus, GST_MESSAGE_WARNING);
+  };
+  const char* const waiting[][2] = {
+      {"window-size", "9"}, {"mode", "live"}, {"hop-size", "3"},           {"method", "qdmd"},
+      {"rank", "2"},        {"solver", "qr"}, {"max-memory", "1000000000"}};
+  for (GstState state : {GST_STATE_PLAYING, GST_STATE_PAUSED}) {
+    ASSERT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, GST_STATE_READY));
+    for (const auto& [name, value] : waiting) {
+      // Not where it takes effect.
+      EXPECT_EQ("", warning_of(name, value)) << name;
+      GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), name);
+      EXPECT_TRUE(spec->flags & GST_PARAM_MUTABLE_READY) << name;
+      GValue before = G_VALUE_INIT;
+      g_value_init(&before, spec->value_type);
+      g_param_value_set_default(spec, &before);
+      g_object_set_property(G_OBJECT(element), name, &before);
+      g_value_unset(&before);
+    }
+    ASSERT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, state));
+    EXPECT_EQ("", next_text(bus, GST_MESSAGE_WARNING));
+    for (const auto& [name, value] : waiting) {
+      const std::string text = warning_of(name, value);
+      EXPECT_NE(std::string::npos, text.find(name)) << name << ": " << text;
+      EXPECT_EQ("", next_text(bus, GST_MESSAGE_WARNING)) << name << ": one is enough";
+      EXPECT_EQ("", warning_of(name, value)) << name << " is that already";
+    }
+    for (const auto& [name, value] : {std::pair{"output", "mask"},
+                                      {"n-threads", "2"},
+                                      {"freeze", "true"},
+                                      {"foreground-threshold", "20"}})
+      EXPECT_EQ("", warning_of(name, value)) << name;
+    for (const auto& [name, value] : {std::pair{"output", "background"},
+                                      {"n-threads", "0"},
+                                      {"freeze", "false"},
+                                      {"foreground-threshold", "0"}})
+      EXPECT_EQ("", warning_of(name, value)) << name;
+  }
+  ASSERT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element, GST_STATE_NULL));
+  EXPECT_EQ("", warning_of("window-size", "33"));
+  gst_element_set_bus(element, nullptr);
+  gst_object_unref(bus);
+  gst_object_unref(element);
+}
+
+TEST(Stats, CountSolvesOverAChangeOfCaps) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 40, 24);
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  const auto solves = [&] {
+    GstStructure* stats = nullptr;
+    g_object_get(element, "stats", &stats, nullptr);
+    guint64 count = 99;
+    EXPECT_TRUE(gst_structure_get_uint64(stats, "solves", &count));
+    gst_structure_free(stats);
+    return count;
+  };
+  stream.push_many(0, 4);
+  EXPECT_EQ(0u, solves());
+  stream.push_many(4, 8);
+  EXPECT_EQ(2u, solves()) << "each with its first frame that leaves";
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 24, 16);
+  EXPECT_EQ(3u, solves()) << "the rest is sent";
+  stream.push_many(12, 4);
+  EXPECT_EQ(3u, solves());
+  stream.push_many(16, 1);
+  EXPECT_EQ(4u, solves());
+  stream.set_caps(GST_VIDEO_FORMAT_BGRA, 24, 16);
+  stream.push_many(17, 1);
+  ASSERT_TRUE(stream.eos());
+  EXPECT_EQ(5u, solves());
+  EXPECT_EQ(18u, stream.take_all().size());
+  gst_object_unref(element);
 }
 
 TEST(Stats, CountFramesAndSolves) {

@@ -19,14 +19,44 @@ class FrameCount : public testing::TestWithParam<int> {};
 TEST_P(FrameCount, AllComeOutInOrderWithTheirTimestamps) {
   Stream stream("qdmdbackground window-size=20", GST_VIDEO_FORMAT_RGB, 40, 24);
   const int count = GetParam();
-  stream.push_many(0, count);
-  const auto before = stream.take_all();
-  expect_frames(before, 0, count / 20 * 20);
+  // With the twentieth, the first: from then on one in, one out.
+  for (int t = 0; t < count; ++t) {
+    ASSERT_EQ(GST_FLOW_OK, stream.push(t));
+    expect_frames(stream.take_all(), t - 19, t < 19 ? 0 : 1);
+  }
+  const int left = std::min(count, 19);
   EXPECT_TRUE(stream.eos());
-  expect_frames(stream.take_all(), count / 20 * 20, count % 20);
+  expect_frames(stream.take_all(), count - left, left);
 }
 
 INSTANTIATE_TEST_SUITE_P(AroundTheWindow, FrameCount, testing::Values(1, 2, 7, 19, 20, 21, 47, 60));
+
+// Larger pictures that come fast are solved while others come, which the latency tells.
+TEST(FrameCount, OfWindowsThatAreSolvedBesideTheFrames) {
+  constexpr int kRate = 1000, kWindow = 20;
+  Stream stream("qdmdbackground window-size=20", GST_VIDEO_FORMAT_RGB, 160, 120, kRate);
+  std::vector<BufferPtr> frames;
+  for (int t = 0; t < 100; ++t) {
+    frames.push_back(stream.make_frame(t, paint_mover));
+    GST_BUFFER_PTS(frames.back().get()) = static_cast<GstClockTime>(t) * GST_SECOND / kRate;
+    GST_BUFFER_DURATION(frames.back().get()) = GST_SECOND / kRate;
+  }
+  const auto delay = static_cast<int>(
+      gst_util_uint64_scale(gst_harness_query_latency(stream.harness()), kRate, GST_SECOND));
+  EXPECT_GT(delay, kWindow - 1);
+  EXPECT_LT(delay, 2 * kWindow);
+  guint64 next = 0;
+  for (int t = 0; t < 100; ++t) {
+    ASSERT_EQ(GST_FLOW_OK,
+              gst_harness_push(stream.harness(), frames[static_cast<size_t>(t)].release()));
+    const auto out = stream.take_all();
+    ASSERT_EQ(t < delay ? 0u : 1u, out.size()) << t;
+    for (const auto& buffer : out) EXPECT_EQ(next++, GST_BUFFER_OFFSET(buffer.get()));
+  }
+  for (const auto& buffer : stream.take_to_end())
+    EXPECT_EQ(next++, GST_BUFFER_OFFSET(buffer.get()));
+  EXPECT_EQ(100u, next);
+}
 
 // A sink that has seen enough, or that is not there, is no error of ours, whoever feeds us.
 TEST(Downstream, MayEndInTheMiddleOfAWindow) {
@@ -159,7 +189,7 @@ TEST(Flags, EachFrameKeepsItsOwn) {
     if (t == 3) GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_MARKER);
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
   }
-  const auto out = stream.take_all();
+  const auto out = stream.take_to_end();
   ASSERT_EQ(5u, out.size());
   for (size_t t = 0; t < 5; ++t)
     EXPECT_EQ(t == 3, GST_BUFFER_FLAG_IS_SET(out[t].get(), GST_BUFFER_FLAG_MARKER)) << t;
@@ -173,10 +203,15 @@ TEST(Flags, DiscontEndsTheWindowBeforeIt) {
   GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
   ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
   expect_frames(stream.take_all(), 0, 4);
-  stream.push_many(101, 9);
-  const auto out = stream.take_all();
-  expect_frames(out, 100, 10);
-  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(out[0].get()));
+  stream.push_many(101, 8);
+  EXPECT_TRUE(stream.take_all().empty()) << "a new window";
+  stream.push_many(109, 1);
+  const auto first = stream.take_all();
+  expect_frames(first, 100, 1);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(first[0].get()));
+  stream.push_many(110, 3);
+  expect_frames(stream.take_all(), 101, 3);
+  expect_frames(stream.take_to_end(), 104, 9);
 }
 
 TEST(Metadata, RegionsOfInterestStayWithTheirFrame) {
@@ -187,7 +222,7 @@ TEST(Metadata, RegionsOfInterestStayWithTheirFrame) {
                                                  4);
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
   }
-  const auto out = stream.take_all();
+  const auto out = stream.take_to_end();
   ASSERT_EQ(4u, out.size());
   for (guint t = 0; t < 4; ++t) {
     const auto* meta = reinterpret_cast<GstVideoRegionOfInterestMeta*>(
@@ -207,14 +242,19 @@ TEST(Events, GapDoesNotOvertakeFrames) {
 TEST(Events, CapsChangeSendsTheOldFramesFirst) {
   Stream stream("qdmdbackground window-size=10", GST_VIDEO_FORMAT_RGB, 24, 16);
   stream.push_many(0, 14);
+  expect_frames(stream.take_all(), 0, 5);
   const auto old_size = stream.info().size;
   stream.set_caps(GST_VIDEO_FORMAT_BGRA, 31, 9);
+  const auto before = stream.take_all();
+  expect_frames(before, 5, 9);
+  for (const auto& buffer : before) EXPECT_EQ(old_size, gst_buffer_get_size(buffer.get()));
   stream.push_many(14, 11);
-  ASSERT_TRUE(stream.eos());
-  const auto out = stream.take_all();
-  expect_frames(out, 0, 25);
+  auto out = stream.take_all();
+  expect_frames(out, 14, 2);
+  for (auto& buffer : stream.take_to_end()) out.push_back(std::move(buffer));
+  expect_frames(out, 14, 11);
   for (size_t i = 0; i < out.size(); ++i)
-    EXPECT_EQ(i < 14 ? old_size : stream.info().size, gst_buffer_get_size(out[i].get())) << i;
+    EXPECT_EQ(stream.info().size, gst_buffer_get_size(out[i].get())) << i;
 }
 
 TEST(Events, EqualCapsDoNotEndTheWindow) {
@@ -228,7 +268,8 @@ TEST(Events, EqualCapsDoNotEndTheWindow) {
               .get())));
   EXPECT_TRUE(stream.take_all().empty());
   stream.push_many(6, 4);
-  expect_frames(stream.take_all(), 0, 10);
+  expect_frames(stream.take_all(), 0, 1);
+  expect_frames(stream.take_to_end(), 1, 9);
 }
 
 TEST(Events, FlushDropsTheWindow) {
@@ -240,8 +281,19 @@ TEST(Events, FlushDropsTheWindow) {
   gst_segment_init(&segment, GST_FORMAT_TIME);
   ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_segment(&segment)));
   EXPECT_TRUE(stream.take_all().empty());
-  stream.push_many(50, 5);
-  expect_frames(stream.take_all(), 50, 5);
+  stream.push_many(50, 4);
+  EXPECT_TRUE(stream.take_all().empty());
+  stream.push_many(54, 1);
+  expect_frames(stream.take_all(), 50, 1);
+  // With frames of two windows.
+  stream.push_many(55, 2);
+  expect_frames(stream.take_all(), 51, 2);
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_flush_start()));
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_flush_stop(TRUE)));
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_segment(&segment)));
+  stream.push_many(70, 5);
+  expect_frames(stream.take_all(), 70, 1);
+  expect_frames(stream.take_to_end(), 71, 4);
 }
 
 TEST(Events, QosDoesNotThinFrames) {
@@ -252,7 +304,8 @@ TEST(Events, QosDoesNotThinFrames) {
         stream.harness(),
         gst_event_new_qos(GST_QOS_TYPE_UNDERFLOW, 9.0, GST_SECOND, 100 * GST_SECOND));
   }
-  expect_frames(stream.take_all(), 0, 20);
+  expect_frames(stream.take_all(), 0, 16);
+  expect_frames(stream.take_to_end(), 16, 4);
 }
 
 }  // namespace
