@@ -68,8 +68,12 @@ static bool with_engine(GstQdmdBackground* self, Action action) {
 }
 
 // Forgets what waits, and where time is.
-static void forget_frames(State* state) {
+static void forget_frames(GstQdmdBackground* self) {
+  State* state = self->state;
   state->shells.clear();
+  GST_OBJECT_LOCK(self);
+  state->latency.restart();
+  GST_OBJECT_UNLOCK(self);
   state->next_pts = GST_CLOCK_TIME_NONE;
 }
 
@@ -78,7 +82,7 @@ void drop_frames(GstQdmdBackground* self) {
   const std::lock_guard lock(state->engine_lock);
   state->background.keep(state->engine, state->io);
   state->engine.flush();
-  forget_frames(state);
+  forget_frames(self);
 }
 
 void close(GstQdmdBackground* self) {
@@ -256,6 +260,9 @@ GstFlowReturn drain(GstQdmdBackground* self) {
     if (flow == GST_FLOW_OK && buffer)
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
   }
+  GST_OBJECT_LOCK(self);
+  state->latency.restart();
+  GST_OBJECT_UNLOCK(self);
   if (flow == GST_FLOW_OK) return flow;
   GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(state->shells.size()),
                    gst_flow_get_name(flow));
@@ -317,7 +324,7 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
                GstCaps* caps) {
   State* state = self->state;
   warn_of_settings_without_effect(self, settings);
-  forget_frames(state);
+  forget_frames(self);
   state->solves_told = 0;
   EngineOptions options = settings.engine;
   options.caller_bytes = FrameIo::bytes(info);

@@ -21,7 +21,6 @@ bool Latency::configure(guint64 frames, gint rate_n, gint rate_d) {
   promised_ =
       std::min(kMost, gst_util_uint64_scale(frames * GST_SECOND, known ? guint64(rate_d) : 1,
                                             known ? guint64(rate_n) : kAssumedRate));
-  first_ = newest_ = GST_CLOCK_TIME_NONE;
   restart();
   return promised_ != before;
 }
@@ -46,7 +45,7 @@ bool Latency::frame_in(GstClockTime timestamp) {
   const guint64 intervals = intervals_++;
   if (intervals < kFirstLook || (intervals & (intervals - 1)) != 0) return false;
   const GstClockTime span = timestamp - first_,
-                     needed = gst_util_uint64_scale(span, frames_, intervals);
+                     needed = std::min(kMost, gst_util_uint64_scale(span, frames_, intervals));
   // Timestamps are rounded, and cameras' frames come a bit early or late.
   return needed > promised_ + promised_ / 16 && promise(needed + span / intervals);
 }
@@ -55,7 +54,7 @@ bool Latency::frame_out(GstClockTime timestamp, GstClockTime held) {
   if (frames_ == 0 || !GST_CLOCK_TIME_IS_VALID(timestamp) || !GST_CLOCK_TIME_IS_VALID(newest_) ||
       timestamp > newest_)
     return false;
-  const GstClockTime waited = newest_ - timestamp;
+  const GstClockTime waited = std::min(kMost, newest_ - timestamp);
   if (waited > promised_ + kInHand / 2) return promise(waited + waited / 16 + held);
   return waited + held > promised_ + kInHand && promise(waited + held + held / 4);
 }

@@ -17,7 +17,10 @@ class Latency {
   // another latency than before.
   bool configure(guint64 frames, gint rate_n, gint rate_d);
   // The next frame is the first after a break. What was promised stays.
-  void restart() { intervals_ = 0; }
+  void restart() {
+    intervals_ = 0;
+    first_ = newest_ = GST_CLOCK_TIME_NONE;
+  }
   GstClockTime promised() const { return promised_; }
 
   // Each returns true where the promise grew: a LATENCY message is due.

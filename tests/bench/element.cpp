@@ -218,12 +218,14 @@ std::vector<std::unique_ptr<Peer>> peers_of(const Frames& frames) {
                                                      std::min<size_t>(window, 30)));
   };
   element("identity", "identity", 1, 2);
-  element("robust", robust + std::to_string(window), window, window);
+  // A share has one solve, which begins in its middle and has ended where it ends.
+  const size_t batch_warm_up = 2 * window + window / 2;
+  element("robust", robust + std::to_string(window), window, batch_warm_up);
   const std::string live =
       std::to_string(kLiveWindow) + " mode=live hop-size=" + std::to_string(kLiveHop);
   element("robust_live", robust + live, kLiveHop, kLiveWindow + kLiveHop);
-  element("qdmd", qdmd + std::to_string(window), window, window);
-  element("qdmd_rank_1", qdmd + std::to_string(window) + " rank=1", window, window);
+  element("qdmd", qdmd + std::to_string(window), window, batch_warm_up);
+  element("qdmd_rank_1", qdmd + std::to_string(window) + " rank=1", window, batch_warm_up);
   element("qdmd_live", qdmd + live, kLiveHop, kLiveWindow + kLiveHop);
   element("segmentation", "segmentation method=mog2 test-mode=true", 1,
           std::min<size_t>(window, 30));

@@ -234,7 +234,7 @@ TEST_F(HalfAWindow, AllocationQueryAsksForNoBuffers) {
 }
 
 TEST(Pools, OfTwoBuffersUpstreamDoNotStall) {
-  Stream stream("qdmdbackground window-size=100", GST_VIDEO_FORMAT_RGB, 40, 24);
+  Stream stream("qdmdbackground window-size=50", GST_VIDEO_FORMAT_RGB, 40, 24);
   GstBufferPool* pool = gst_buffer_pool_new();
   GstStructure* config = gst_buffer_pool_get_config(pool);
   GstCaps* caps = gst_video_info_to_caps(&stream.info());
@@ -252,10 +252,10 @@ TEST(Pools, OfTwoBuffersUpstreamDoNotStall) {
     stream.fill(buffer, t, paint_mover);
     ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer));
     const size_t now = stream.take_all().size();
-    ASSERT_EQ(t < 99 ? 0u : 1u, now) << t;
+    ASSERT_EQ(t < 49 ? 0u : 1u, now) << t;
     out += now;
   }
-  EXPECT_EQ(151u, out);
+  EXPECT_EQ(201u, out);
   out += stream.take_to_end().size();
   EXPECT_EQ(250u, out);
   gst_buffer_pool_set_active(pool, FALSE);
@@ -424,8 +424,9 @@ TEST(Pipelines, ALiveTeeWithAudioBesideKeepsTime) {
       "queue max-size-time=1000000000 max-size-buffers=0 max-size-bytes=0 ! "
       "fakesink name=audio sync=true",
       [](GstBin* pipeline) {
-        // The source has a frame's latency of its own, and sinks a processing-deadline of 20 ms.
-        EXPECT_EQ((13 - 1 + 1) * kFrame + 20 * GST_MSECOND, latency_of(pipeline));
+        // A solve takes more than a third of a frame's time, so that it has one. The source has a
+        // frame's latency of its own, and sinks a processing-deadline of 20 ms.
+        EXPECT_EQ((13 - 1 + 1 + 1) * kFrame + 20 * GST_MSECOND, latency_of(pipeline));
         expect_none_dropped(pipeline, "separated", 50);
         expect_none_dropped(pipeline, "original", 50);
         expect_none_dropped(pipeline, "audio", 86);
