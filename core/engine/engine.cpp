@@ -180,7 +180,7 @@ bool Engine::learnt(Learnt* learnt) {
   return true;
 }
 
-Status Engine::learn_from(const Learnt& learnt) {
+Status Engine::may_learn_from(const Learnt& learnt) const {
   if (!configured()) return {Status::Code::not_configured, "configure the engine before it learns"};
   if (learnt.width != frames_.width() || learnt.height != frames_.height())
     return {Status::Code::invalid_options,
@@ -188,6 +188,11 @@ Status Engine::learn_from(const Learnt& learnt) {
                 std::to_string(learnt.height) + " video and this video is " +
                 std::to_string(frames_.width()) + "x" + std::to_string(frames_.height()) +
                 ": scale the video, or save the background of video of this size."};
+  return {};
+}
+
+Status Engine::learn_from(const Learnt& learnt) {
+  if (Status status = may_learn_from(learnt); !status.ok()) return status;
   workers_->side().rest();
   schedule_->learn_from(learnt, queue_);
   return {};

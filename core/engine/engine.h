@@ -53,6 +53,8 @@ class Engine {
   // picture is used where there is no background yet, or no frame waits. Not ok where the size is
   // another; all is then as it was. Waits, and throws, as learnt() does.
   Status learn_from(const Learnt& learnt);
+  // What learn_from() would say.
+  Status may_learn_from(const Learnt& learnt) const;
   // Makes every waiting frame ready; their windows may be solved as they are popped. The frame
   // after it belongs to a new window: time is broken.
   Status drain();

@@ -98,7 +98,8 @@ Status damaged(const std::string& what) {
   return bad("it is damaged (" + what + "): save it again, or take another copy.");
 }
 
-Status read_header(std::span<const uint8_t> bytes, Header* header) {
+// Of a file of so many bytes in all.
+Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header) {
   if (bytes.empty()) return bad("it is empty: save it again, or take another copy.");
   const size_t seen = std::min(bytes.size(), kMagic.size());
   if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(seen), kMagic.begin()))
@@ -126,6 +127,9 @@ Status read_header(std::span<const uint8_t> bytes, Header* header) {
                     (h.sections & ~kAllSections) == 0 && grid && h.zero == 0 &&
                     std::isfinite(h.noise) && h.noise >= 0;
   if (!sane || h.bytes != h.bytes_of_all()) return damaged("its first bytes make no sense");
+  if (h.bytes != all)
+    return damaged("it has " + std::to_string(all) + " bytes in place of " +
+                   std::to_string(h.bytes));
   *header = h;
   return {};
 }
@@ -168,19 +172,14 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
   return writer.take();
 }
 
-Status packed_bytes(std::span<const uint8_t> header, uint64_t* bytes) {
+Status check_header(std::span<const uint8_t> header, uint64_t bytes) {
   Header h;
-  const Status status = read_header(header, &h);
-  if (status.ok()) *bytes = h.bytes;
-  return status;
+  return read_header(header, bytes, &h);
 }
 
 Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
   Header header;
-  if (Status status = read_header(bytes, &header); !status.ok()) return status;
-  if (bytes.size() != header.bytes)
-    return damaged("it has " + std::to_string(bytes.size()) + " bytes in place of " +
-                   std::to_string(header.bytes));
+  if (Status status = read_header(bytes, bytes.size(), &header); !status.ok()) return status;
   const auto checked = bytes.first(bytes.size() - kChecksumBytes);
   if (Reader(bytes.last(kChecksumBytes)).number<uint64_t>() != checksum(checked))
     return damaged("its checksum is wrong");

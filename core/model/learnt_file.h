@@ -24,9 +24,10 @@ constexpr size_t kLearntHeaderBytes = 56;
 // `learnt` is whole: as Engine::learnt() made it, or unpack().
 std::vector<uint8_t> pack(const Learnt& learnt);
 
-// Of a file whose first kLearntHeaderBytes bytes, or fewer where it ends there, are `header`: how
-// many it has in all. The messages say of "it" what is wrong with the file and what to do.
-Status packed_bytes(std::span<const uint8_t> header, uint64_t* bytes);
+// Of a file of `bytes` bytes that begins with `header` (kLearntHeaderBytes, fewer where it ends
+// before): whether it can be such a file. The messages here say of "it" what is wrong with the file
+// and what to do.
+Status check_header(std::span<const uint8_t> header, uint64_t bytes);
 
 // All of a file. Not ok: `learnt` is as it was. Throws std::bad_alloc, for no more memory than
 // `bytes` have.
