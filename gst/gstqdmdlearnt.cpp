@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <utility>
@@ -19,6 +20,8 @@ namespace {
 
 // What went wrong, as a sentence about a file; null: nothing.
 using Problem = CharsPtr;
+
+constexpr const char* kNoMemory = "there is not enough memory: scale the video down, or free some.";
 
 Problem problem(const char* what) { return Problem(g_strdup(what)); }
 Problem problem(const Status& status) {
@@ -41,7 +44,7 @@ Problem guarded(Action action) {
   try {
     return action();
   } catch (const std::bad_alloc&) {
-    return problem("there is not enough memory: scale the video down, or free some.");
+    return problem(kNoMemory);
   } catch (const std::exception& error) {
     return problem(error.what());
   }
@@ -89,6 +92,17 @@ Problem write(const gchar* file, const std::vector<uint8_t>& bytes) {
   return wrong;
 }
 
+// what: "save .. to" or "load .. of". code: of GST_RESOURCE_ERROR, unless there is no memory.
+void post(GstQdmdBackground* self, GstMessageType type, GstResourceError code, const char* what,
+          const gchar* name, const Problem& wrong) {
+  if (std::strcmp(wrong.get(), kNoMemory) == 0) code = GST_RESOURCE_ERROR_NO_SPACE_LEFT;
+  gst_element_message_full(GST_ELEMENT(self), type, GST_RESOURCE_ERROR, code,
+                           g_strdup_printf("Cannot %s \"%s\": %s", what, name, wrong.get()),
+                           nullptr, __FILE__, __func__, __LINE__);
+}
+constexpr const char* kSave = "save the background to";
+constexpr const char* kLoad = "load the background of";
+
 // With the engine lock: whether the video is one that it may be the background of.
 Problem check(const State& state, const Learnt& learnt) {
   if (learnt.colours == state.colours) return problem(state.engine.may_learn_from(learnt));
@@ -134,9 +148,7 @@ bool save_learnt(GstQdmdBackground* self, const gchar* file) {
   });
   const CharsPtr name = shown(file);
   if (wrong) {
-    GST_ELEMENT_WARNING(self, RESOURCE, OPEN_WRITE,
-                        ("Cannot save the background to \"%s\": %s", name.get(), wrong.get()),
-                        (nullptr));
+    post(self, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_WRITE, kSave, name.get(), wrong);
     return false;
   }
   GST_INFO_OBJECT(self, "saved the background to \"%s\"", name.get());
@@ -166,9 +178,7 @@ bool load_learnt(GstQdmdBackground* self, const gchar* file) {
   });
   const CharsPtr name = shown(file);
   if (wrong) {
-    GST_ELEMENT_WARNING(self, RESOURCE, OPEN_READ,
-                        ("Cannot load the background of \"%s\": %s", name.get(), wrong.get()),
-                        (nullptr));
+    post(self, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_READ, kLoad, name.get(), wrong);
     return false;
   }
   GST_INFO_OBJECT(self, "loaded the background of \"%s\"", name.get());
@@ -196,10 +206,8 @@ bool read_load_location(GstQdmdBackground* self) {
     return nullptr;
   });
   if (!wrong) return true;
-  GST_ELEMENT_ERROR(
-      self, RESOURCE, OPEN_READ,
-      ("Cannot load the background of \"%s\": %s", shown(location.get()).get(), wrong.get()),
-      ("load-location"));
+  post(self, GST_MESSAGE_ERROR, GST_RESOURCE_ERROR_OPEN_READ, kLoad, shown(location.get()).get(),
+       wrong);
   return false;
 }
 
@@ -212,16 +220,11 @@ bool apply_loaded(GstQdmdBackground* self) {
     return loaded ? give(state, loaded->learnt) : nullptr;
   });
   if (!wrong) return true;
-  if (!loaded->at_start) {
-    GST_ELEMENT_WARNING(
-        self, RESOURCE, SETTINGS,
-        ("Cannot load the background of \"%s\": %s", loaded->file.get(), wrong.get()), (nullptr));
-    return true;
-  }
-  GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
-                    ("Cannot load the background of \"%s\": %s", loaded->file.get(), wrong.get()),
-                    ("load-location"));
-  return false;
+  // Without what the user has set, the element does not start.
+  const bool stop = loaded->at_start;
+  post(self, stop ? GST_MESSAGE_ERROR : GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_SETTINGS, kLoad,
+       loaded->file.get(), wrong);
+  return !stop;
 }
 
 }  // namespace qdmd
