@@ -37,6 +37,7 @@
 
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdframes.h"
+#include "gst/gstqdmdlearnt.h"
 
 GST_DEBUG_CATEGORY(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -45,8 +46,9 @@ namespace {
 
 using qdmd::Settings;
 
-constexpr guint kStatsProperty = qdmd::kFirstFreeProperty,
-                kBackgroundProperty = qdmd::kFirstFreeProperty + 1;
+constexpr guint kLoadLocationProperty = qdmd::kFirstFreeProperty,
+                kStatsProperty = qdmd::kFirstFreeProperty + 1,
+                kBackgroundProperty = qdmd::kFirstFreeProperty + 2;
 
 #define QDMD_FORMATS \
   "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, GRAY8 }"
@@ -62,9 +64,29 @@ GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
 
 // ---- Properties ---------------------------------------------------------------------------------
 
+static void gst_qdmd_background_set_load_location(GObject* object, const GValue* value) {
+  qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
+  // The old one ends after the lock.
+  qdmd::CharsPtr location(g_value_dup_string(value));
+  GST_OBJECT_LOCK(object);
+  state->load_location.swap(location);
+  const bool changed = g_strcmp0(state->load_location.get(), location.get()) != 0;
+  const bool running = GST_STATE(object) > GST_STATE_READY;
+  GST_OBJECT_UNLOCK(object);
+  if (changed && running)
+    GST_ELEMENT_WARNING(object, LIBRARY, SETTINGS,
+                        ("load-location takes effect when the element starts again from READY: "
+                         "use the signal `load` now."),
+                        (nullptr));
+}
+
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
   qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
+  if (id == kLoadLocationProperty) {
+    gst_qdmd_background_set_load_location(object, value);
+    return;
+  }
   GValue before = G_VALUE_INIT;
   g_value_init(&before, G_PARAM_SPEC_VALUE_TYPE(spec));
   GST_OBJECT_LOCK(object);
@@ -90,6 +112,10 @@ static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* 
   bool known = qdmd::get_setting(state->settings, id, value);
   if (id == kStatsProperty) {
     g_value_take_boxed(value, qdmd::make_stats(state->report, state->counters));
+    known = true;
+  }
+  if (id == kLoadLocationProperty) {
+    g_value_set_string(value, state->load_location.get());
     known = true;
   }
   GST_OBJECT_UNLOCK(object);
@@ -233,9 +259,11 @@ static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
   state->counters = {};
   state->report = qdmd::SolveReport();
   GST_OBJECT_UNLOCK(self);
-  const std::lock_guard lock(state->engine_lock);
-  state->background.forget();
-  return TRUE;
+  {
+    const std::lock_guard lock(state->engine_lock);
+    state->background.forget();
+  }
+  return qdmd::read_load_location(self);
 }
 
 static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
@@ -264,6 +292,14 @@ static void gst_qdmd_background_reset(GstQdmdBackground* self) {
   GST_OBJECT_UNLOCK(self);
 }
 
+static gboolean gst_qdmd_background_save(GstQdmdBackground* self, const gchar* file) {
+  return qdmd::save_learnt(self, file);
+}
+
+static gboolean gst_qdmd_background_load(GstQdmdBackground* self, const gchar* file) {
+  return qdmd::load_learnt(self, file);
+}
+
 static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
@@ -274,6 +310,14 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
   object_class->get_property = gst_qdmd_background_get_property;
   object_class->finalize = gst_qdmd_background_finalize;
   qdmd::install_settings(object_class);
+  g_object_class_install_property(
+      object_class, kLoadLocationProperty,
+      g_param_spec_string(
+          "load-location", "Load location",
+          "File of the signal `save` whose background the element starts with: it "
+          "is read each time that the element starts (null: none)",
+          nullptr,
+          GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property(
       object_class, kStatsProperty,
       g_param_spec_boxed("stats", "Statistics",
@@ -300,6 +344,38 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
   g_signal_new_class_handler(
       "reset", G_TYPE_FROM_CLASS(klass), GSignalFlags(G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
       G_CALLBACK(gst_qdmd_background_reset), nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
+  /**
+   * GstQdmdBackground::save:
+   * @file: name of the file, in the encoding of file names
+   *
+   * Writes what was learnt of the background into a file, in place of what it held: the picture of
+   * the property `background`, noise, and of `method=robust` what the next window is told. Waits
+   * for a solve that is under way. Any thread, while the element is PAUSED or PLAYING.
+   *
+   * Returns: %TRUE if it is written. Else the file is as it was, and a warning was posted.
+   */
+  g_signal_new_class_handler("save", G_TYPE_FROM_CLASS(klass),
+                             GSignalFlags(G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
+                             G_CALLBACK(gst_qdmd_background_save), nullptr, nullptr, nullptr,
+                             G_TYPE_BOOLEAN, 1, G_TYPE_STRING);
+  /**
+   * GstQdmdBackground::load:
+   * @file: name of the file, in the encoding of file names
+   *
+   * Goes on with what was learnt and saved, of video of the same size and colour family (RGB, YUV
+   * or grey), from any thread; before caps are known it waits for them. No frame is lost. In
+   * #GstQdmdBackground:mode `live` the loaded background is held from the next frame on until there
+   * is a new model. In `batch` the windows that end from now on are told of it (`method=robust`),
+   * and it is the background at once where there is none yet or no frame waits. The signal `reset`,
+   * a flush and a new stream forget it.
+   *
+   * Returns: %TRUE if it is loaded, or waits for caps. Else nothing has changed, and a warning was
+   * posted.
+   */
+  g_signal_new_class_handler("load", G_TYPE_FROM_CLASS(klass),
+                             GSignalFlags(G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
+                             G_CALLBACK(gst_qdmd_background_load), nullptr, nullptr, nullptr,
+                             G_TYPE_BOOLEAN, 1, G_TYPE_STRING);
 
   gst_element_class_set_static_metadata(
       element_class, "Q-DMD background separator", "Filter/Effect/Video",

@@ -7,6 +7,7 @@
 
 #include "core/foreground/regions.h"
 #include "gst/gstqdmdenums.h"
+#include "gst/gstqdmdlearnt.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -331,17 +332,19 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
-  return with_engine(self, [&](Engine& engine) {
+  const bool configured = with_engine(self, [&](Engine& engine) {
     state->background.keep(engine, state->io);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
+    state->colours = colours_of(info);
     if (status.ok())
       state->shells.reserve(static_cast<size_t>(engine.delay()) + 1);
     else
       engine.flush();
     return status;
   });
+  return configured && apply_loaded(self);
 }
 
 GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
@@ -358,7 +361,11 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
     const GstFlowReturn flow = drain(self);
     if (flow != GST_FLOW_OK) return flow;
   }
-  if (reset) drop_frames(self);
+  if (reset) {
+    drop_frames(self);
+    // Loaded after the reset was asked for.
+    if (!apply_loaded(self)) return GST_FLOW_ERROR;
+  }
   self->state->came = g_get_monotonic_time();
   return GST_FLOW_OK;
 }

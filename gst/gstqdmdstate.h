@@ -3,10 +3,12 @@
 
 #include <gst/video/gstvideofilter.h>
 
+#include <memory>
 #include <mutex>
 #include <vector>
 
 #include "core/engine/engine.h"
+#include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
 #include "gst/frameio.h"
 #include "gst/gstqdmdbackground.h"
@@ -17,6 +19,13 @@
 
 namespace qdmd {
 
+// What was loaded and waits for the video that it is of.
+struct Loaded {
+  Learnt learnt;
+  CharsPtr file;          // its name, to be shown
+  bool at_start = false;  // by load-location: the element does not go on without it
+};
+
 struct State {
   // Protected by the object lock.
   Settings settings;
@@ -24,6 +33,7 @@ struct State {
   Counters counters;
   bool reset_asked = false;
   SolveReport report;
+  CharsPtr load_location;
 
   // Held while the engine works, by the streaming thread and by a thread that reads `background`;
   // never while something is pushed, queried or posted. The object lock may be taken inside it.
@@ -32,6 +42,8 @@ struct State {
   Engine engine;
   FrameIo io;
   BackgroundSample background;
+  Colours colours = Colours::rgb;  // of the video that the engine is configured for
+  std::unique_ptr<Loaded> loaded;
 
   // Protected by the stream lock.
   // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that

@@ -25,6 +25,11 @@ struct UnrefCaps {
 };
 using CapsPtr = std::unique_ptr<GstCaps, UnrefCaps>;
 
+struct FreeChars {
+  void operator()(gchar* chars) const { g_free(chars); }
+};
+using CharsPtr = std::unique_ptr<gchar, FreeChars>;
+
 // Buffers in the order in which they came: a ring.
 class BufferQueue {
  public:

@@ -9,10 +9,11 @@ namespace qdmd {
 struct Status {
   enum class Code {
     ok,
-    invalid_options,    // a value outside its range
-    too_much_memory,    // what is asked for needs more than max_memory
-    not_configured,     // push or drain before configure
-    frames_are_waiting  // push while frames are ready: pop them first
+    invalid_options,     // a value outside its range
+    too_much_memory,     // what is asked for needs more than max_memory
+    not_configured,      // push or drain before configure
+    frames_are_waiting,  // push while frames are ready: pop them first
+    bad_file             // bytes that are nothing that was saved
   };
   Code code = Code::ok;
   std::string message;

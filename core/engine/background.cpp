@@ -1,5 +1,6 @@
 #include "core/engine/background.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace qdmd {
@@ -13,6 +14,31 @@ void Background::forget() {
   learner_->forget();
   known_ = false;
   state_ = State::learnt;
+}
+
+void Background::remember(Learnt* learnt) const {
+  const BackgroundModel& model = models_[newest_];
+  const size_t count = pixels();
+  for (auto& level : learnt->level) level.resize(count);
+  for (size_t first = 0; first < count; first += kMaxRun) {
+    uint8_t* const out[3] = {learnt->level[0].data() + first, learnt->level[1].data() + first,
+                             learnt->level[2].data() + first};
+    model.evaluate(first, std::min(kMaxRun, count - first), out);
+  }
+  if (model.limits()) learnt->limits.assign(model.limits(), model.limits() + count);
+  learnt->noise = report_.foreground.noise;
+  learner_->remember(learnt);
+}
+
+void Background::show(const Learnt& learnt, State state) {
+  const bool limits = learner_->makes_limits() && !learnt.limits.empty();
+  model().freeze_as(learnt.level, limits ? &learnt.limits : nullptr, pixels());
+  learner_->follow(learnt.level);
+  report_ = {};
+  report_.foreground.noise = learnt.noise;
+  set_threshold(fixed_threshold_);
+  known_ = true;
+  state_ = state;
 }
 
 void Background::begin(const SnapshotRange& snapshots) {

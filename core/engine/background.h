@@ -29,6 +29,16 @@ class Background {
   // Forgets the model and what earlier windows showed.
   void forget();
 
+  // What is known, with the L of the time and light that the model is set to.
+  void remember(Learnt* learnt) const;
+  // The solves to come are told of it as of a window before them. Not while one runs, and neither
+  // is show(). Where it throws, all is as it was.
+  void recall(const Learnt& learnt) { learner_->recall(learnt); }
+  // Its picture is the one in use, and held, until publish(). Throws only where make_room() was not
+  // called before; where that throws, all is as it was.
+  void show(const Learnt& learnt, State state);
+  void make_room() { model().make_room(pixels(), learner_->makes_limits()); }
+
   // ---- The next ----
 
   // Learner::decompose(). What is finished and not yet published stays.
@@ -63,6 +73,7 @@ class Background {
   double fixed_threshold() const { return fixed_threshold_; }
 
  private:
+  size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 
   LearnerRoom room_;

@@ -148,6 +148,14 @@ void BatchSchedule::restart() {
   shown_ = {taken(), taken(), taken()};
 }
 
+// Frames that wait have their background, or their window is about to be solved.
+void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
+  const bool shown = !background().known() || queue.pending == 0;
+  if (shown) background().make_room();
+  background().recall(learnt);
+  if (shown) background().show(learnt, State::held);
+}
+
 void BatchSchedule::show(int index) {
   const int64_t frame = kept_from() + index;
   if (frame == shown_.end) advance();

@@ -23,6 +23,7 @@ class BatchSchedule : public Schedule {
   bool push(const ImageView& frame, bool freeze, Queue* queue) override;
   void drain(Queue* queue) override;
   void restart() override;
+  void learn_from(const Learnt& learnt, const Queue& queue) override;
   void show(int index) override;
   void show_newest() override;
   int frames_left(const Queue& queue) const override;

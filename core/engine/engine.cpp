@@ -1,6 +1,8 @@
 #include "core/engine/engine.h"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "core/engine/batch_schedule.h"
 #include "core/engine/live_schedule.h"
@@ -163,6 +165,37 @@ bool Engine::write_background(const MutableImageView& out) {
   schedule_->show_newest();
   write_output(task_of(Output::background), out, 0, frames_.height());
   return true;
+}
+
+bool Engine::learnt(Learnt* learnt) {
+  if (!configured() || !background_->known()) return false;
+  // What it threw, the next frame is told.
+  workers_->side().rest();
+  schedule_->show_newest();
+  Learnt all;
+  all.width = frames_.width();
+  all.height = frames_.height();
+  background_->remember(&all);
+  *learnt = std::move(all);
+  return true;
+}
+
+Status Engine::may_learn_from(const Learnt& learnt) const {
+  if (!configured()) return {Status::Code::not_configured, "configure the engine before it learns"};
+  if (learnt.width != frames_.width() || learnt.height != frames_.height())
+    return {Status::Code::invalid_options,
+            "it is the background of " + std::to_string(learnt.width) + "x" +
+                std::to_string(learnt.height) + " video and this video is " +
+                std::to_string(frames_.width()) + "x" + std::to_string(frames_.height()) +
+                ": scale the video, or save the background of video of this size."};
+  return {};
+}
+
+Status Engine::learn_from(const Learnt& learnt) {
+  if (Status status = may_learn_from(learnt); !status.ok()) return status;
+  workers_->side().rest();
+  schedule_->learn_from(learnt, queue_);
+  return {};
 }
 
 void Engine::pop(Output output, const MutableImageView& out) {

@@ -43,6 +43,18 @@ class Engine {
   // Writes the newest background: that of the last frame of a batch that was solved for, or of the
   // frame with which a live model came; or the one that is held. False: there is none yet.
   bool write_background(const MutableImageView& out);
+  // What was learnt of the background that write_background() writes, with its picture; its colours
+  // are the caller's. False: nothing yet. Waits for a solve that is under way. Where it throws, no
+  // frame is lost.
+  bool learnt(Learnt* learnt);
+  // Goes on with what an earlier run learnt: the background is held until there is a model of this
+  // one's frames, as after drain(), and method=robust is told of it as of a window before. Live: at
+  // once, and the next frame begins a new window. Batch: windows that end from now on are told; the
+  // picture is used where there is no background yet, or no frame waits. Not ok where the size is
+  // another; all is then as it was. Waits, and throws, as learnt() does.
+  Status learn_from(const Learnt& learnt);
+  // What learn_from() would say.
+  Status may_learn_from(const Learnt& learnt) const;
   // Makes every waiting frame ready; their windows may be solved as they are popped. The frame
   // after it belongs to a new window: time is broken.
   Status drain();

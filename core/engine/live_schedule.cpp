@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace qdmd {
+namespace {
+
+using State = Background::State;
+
+}  // namespace
 
 LiveSchedule::LiveSchedule(const Stage& stage, const LivePlan& plan)
     : Schedule(stage), plan_(plan) {}
@@ -17,13 +22,17 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (frozen || start_new_window_) {
     const bool has_model = background().known();
     stop();
-    if (has_model) background().hold(time(), Background::State::held);
+    if (has_model) {
+      // What was loaded goes on to follow the light.
+      const bool in_light = !frozen && background().state() == State::held_in_light;
+      background().hold(time(), in_light ? State::held_in_light : State::held);
+    }
     frames().clear();
     begin_window(has_model);
   }
   if (!frames().append(frame)) return false;
   if (!frozen) begin_work();
-  if (background().state() == Background::State::learnt)
+  if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
   if (background().solves() > solves) published_ = {time(), background().model().light()};
   pace().count_frame();
@@ -126,6 +135,17 @@ void LiveSchedule::restart() {
   begin_window(false);
 }
 
+// What is under way is about other frames: the next one begins a new window.
+void LiveSchedule::learn_from(const Learnt& learnt, const Queue&) {
+  background().make_room();
+  background().recall(learnt);
+  stop();
+  background().show(learnt,
+                    background().learner().follows_light() ? State::held_in_light : State::held);
+  pace().solve_next();
+  start_new_window_ = true;
+}
+
 // The newest frame's time in the model in use. Where the light is followed, it ends with the
 // model's window; else, where solves are left out, with the frames for which the plan has the
 // model: a mode does not go on to grow or fade.
@@ -136,15 +156,15 @@ double LiveSchedule::time() const {
 }
 
 void LiveSchedule::show(int index) {
-  if (background().state() == Background::State::learnt)
-    background().follow_light(frames().slot(index));
+  if (background().state() != State::held) background().follow_light(frames().slot(index));
   background().model().set_time(time());
 }
 
 void LiveSchedule::show_newest() {
   BackgroundModel& model = background().model();
-  if (background().state() == Background::State::learnt && background().learner().follows_light())
+  if (background().state() == State::learnt && background().learner().follows_light())
     model.set_light(published_.light);
+  if (background().state() == State::held_in_light) model.set_light(kSameLight);
   model.set_time(published_.time);
 }
 

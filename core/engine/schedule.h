@@ -41,6 +41,9 @@ class Schedule {
   virtual void drain(Queue* queue) = 0;
   // Drops the work that is under way, and all frames. The background is forgotten, too.
   virtual void restart() = 0;
+  // What an earlier run learnt, of frames of this size, no solve being under way. No frame is lost.
+  // Where it throws, all is as it was.
+  virtual void learn_from(const Learnt& learnt, const Queue& queue) = 0;
   // Sets the model to the time, and the light, of frame `index` of the store.
   virtual void show(int index) = 0;
   // The same for the newest background.

@@ -11,6 +11,7 @@
 #include "core/frames/frame_store.h"
 #include "core/learn/method.h"
 #include "core/model/background_model.h"
+#include "core/model/learnt.h"
 #include "core/parallel/pool.h"
 #include "core/passes/bands.h"
 
@@ -76,6 +77,13 @@ class Learner {
   virtual void begin(const LearnerRoom& room) = 0;
   // Forgets what earlier windows showed of the background.
   virtual void forget() {}
+  // Adds to `learnt` what solves to come are told of the background, and takes that from there
+  // (what does not suit it, it leaves: nothing is known then). Not while a solve runs.
+  virtual void remember(Learnt* /*learnt*/) const {}
+  // Where it throws, all is as it was.
+  virtual void recall(const Learnt& /*learnt*/) {}
+  // True where models have limits.
+  virtual bool makes_limits() const { return false; }
   // Of the solves to come: one of sample_steps(). Not while one runs.
   virtual void set_sample_step(int) {}
 
@@ -96,6 +104,8 @@ class Learner {
 
   // True where the background in use is to have the light() of each frame.
   virtual bool follows_light() const { return false; }
+  // The background in use is this picture now, which no window made. Not while a solve runs.
+  virtual void follow(const std::vector<uint8_t> /*level*/[kChannels]) {}
   // Of the frame in `slot`, over the background in use.
   virtual Gain light(int /*slot*/) { return kSameLight; }
 };

@@ -53,8 +53,8 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   const auto pictures = static_cast<size_t>(basis_.rows());
   // Room for more pictures is made without the old ones beside it.
   if (samples_.capacity() < pictures * pixels_) std::vector<float>().swap(samples_);
-  direct_ = !keep_pictures &&
-            may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
+  direct_ =
+      !keep_pictures && may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
   make_pictures(direct_ ? 0 : pictures);
   if (!direct_) group_by_four(basis_, &coefficients_);
 }
@@ -156,6 +156,32 @@ void BackgroundModel::freeze_at(double t) {
   frozen_ = true;
   gains_.clear();
   weights_.assign(kIdentity.begin(), kIdentity.end());
+}
+
+void BackgroundModel::make_room(size_t pixels, bool limits) {
+  weights_.reserve(kIdentity.size());
+  pictures_.reserve(kChannels);
+  if (limits) limits_.reserve(pixels);
+  if (samples_.capacity() >= kChannels * pixels) return;
+  // Without the old ones beside it, unless they are in use.
+  if (picture_count() == 0) std::vector<float>().swap(samples_);
+  samples_.reserve(kChannels * pixels);
+  make_pictures(picture_count());
+}
+
+void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
+                                const std::vector<uint8_t>* limits, size_t pixels) {
+  pixels_ = pixels;
+  make_pictures(kChannels);
+  for (size_t c = 0; c < kChannels; ++c) std::copy(level[c].begin(), level[c].end(), pictures_[c]);
+  if (limits)
+    limits_ = *limits;
+  else
+    limits_.clear();
+  gains_.clear();
+  weights_.assign(kIdentity.begin(), kIdentity.end());
+  direct_ = false;
+  frozen_ = true;
 }
 
 }  // namespace qdmd

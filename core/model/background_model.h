@@ -64,6 +64,12 @@ class BackgroundModel {
   // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are
   // no longer needed.
   void freeze_at(double t);
+  // The same with a picture that no window made: planes of `pixels` samples, and limits or null.
+  // Throws only where make_room() was not called before.
+  void freeze_as(const std::vector<uint8_t> level[kChannels], const std::vector<uint8_t>* limits,
+                 size_t pixels);
+  // Where it throws, all is as it was.
+  void make_room(size_t pixels, bool limits);
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);

@@ -28,6 +28,8 @@ class SideThread {
   void finish();
   // The same, and forgets what it threw: nobody waits for the result.
   void abandon() noexcept;
+  // The same, and keeps what it threw for finish().
+  void rest() noexcept { wait(); }
   // True where nothing runs.
   bool idle();
 

@@ -34,4 +34,29 @@ void Earlier::take(const Grid& grid, const Reference& background,
   known_ = true;
 }
 
+void Earlier::write(const Grid& grid, Learnt::Earlier* out) const {
+  for (size_t c = 0; c < kChannels; ++c) out->level[c] = level_[c];
+  out->spread = spread_;
+  out->rows = grid.rows;
+  out->cols = grid.cols;
+  out->weight = weight_;
+  out->limit = limit_;
+}
+
+void Earlier::read(const Grid& grid, const Learnt::Earlier& from) {
+  // Memory first, and the old content stays until all of it is there.
+  for (size_t c = 0; c < kChannels; ++c) level_[c].reserve(from.level[c].size());
+  spread_.reserve(from.spread.size());
+  weight_.reserve(from.weight.size());
+  limit_.reserve(from.limit.size());
+  for (size_t c = 0; c < kChannels; ++c) {
+    level_[c] = from.level[c];
+    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+  }
+  spread_ = from.spread;
+  weight_ = from.weight;
+  limit_ = from.limit;
+  known_ = true;
+}
+
 }  // namespace qdmd

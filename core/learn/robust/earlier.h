@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/learn/robust/median_picture.h"
+#include "core/model/learnt.h"
 #include "core/passes/mask.h"
 
 namespace qdmd {
@@ -31,6 +32,10 @@ class Earlier {
   // window's frames that no window before had. spread: as median_picture() has it, blurred.
   void take(const Grid& grid, const Reference& background, const std::vector<uint8_t>& spread,
             const StableFrames& stable, int count, float fresh);
+
+  // What is known, for a file and back. Where read() throws, all is as it was.
+  void write(const Grid& grid, Learnt::Earlier* out) const;
+  void read(const Grid& grid, const Learnt::Earlier& from);
 
  private:
   bool known_ = false;  // set last: what follows is whole

@@ -108,6 +108,24 @@ void RobustLearner::begin(const LearnerRoom& room) {
   reach_.resize(room.frames->window().plane_size());
 }
 
+void RobustLearner::remember(Learnt* learnt) const {
+  learnt->earlier.reset();
+  if (earlier_.known()) earlier_.write(grid_, &learnt->earlier.emplace());
+}
+
+void RobustLearner::recall(const Learnt& learnt) {
+  if (parameters_.earlier_share <= 0) return;
+  if (learnt.earlier && learnt.earlier->rows == grid_.rows && learnt.earlier->cols == grid_.cols)
+    earlier_.read(grid_, *learnt.earlier);
+  else
+    earlier_.forget();
+}
+
+void RobustLearner::follow(const std::vector<uint8_t> level[kChannels]) {
+  for (int c = 0; c < kChannels; ++c)
+    cell_means(grid_, level[c].data(), background_cells_.plane(published_, c));
+}
+
 void RobustLearner::set_sample_step(int step) {
   step_ = step;
   samples_.resize(samples_at(step_));

@@ -53,6 +53,9 @@ class RobustLearner : public Learner {
 
   void begin(const LearnerRoom& room) override;
   void forget() override { earlier_.forget(); }
+  void remember(Learnt* learnt) const override;
+  void recall(const Learnt& learnt) override;
+  bool makes_limits() const override { return true; }
   void set_sample_step(int step) override;
   void add(const SnapshotRange&, int, Slice) override {}
   void decompose(const SnapshotRange& snapshots) override;
@@ -61,6 +64,7 @@ class RobustLearner : public Learner {
   void publish() override { published_ = 1 - published_; }
 
   bool follows_light() const override { return true; }
+  void follow(const std::vector<uint8_t> level[kChannels]) override;
   Gain light(int slot) override {
     return light_over(room_.frames->cells(), slot, background_cells_, published_, &light_scratch_);
   }

@@ -1,0 +1,35 @@
+// What was learnt of a scene's background, to go on with later.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/base/channels.h"
+
+namespace qdmd {
+
+// What a pixel's three channels are. Only the caller knows; it decides which videos a background
+// belongs to.
+enum class Colours : uint8_t { rgb, yuv, grey };
+
+// A background in use with its statistics, and what windows to come are told of it. Planes have
+// width * height samples.
+struct Learnt {
+  // Of method=robust: what a window leaves to the next.
+  struct Earlier {
+    std::vector<uint8_t> level[kChannels], spread;
+    // By the cells of a grid.
+    int rows = 0, cols = 0;
+    std::vector<float> weight, limit;
+  };
+
+  int width = 0, height = 0;
+  Colours colours = Colours::rgb;
+  std::vector<uint8_t> level[kChannels];  // L as it was shown
+  std::vector<uint8_t> limits;            // BackgroundModel::limits(), or empty
+  double noise = 0;                       // ForegroundStatistics::noise
+  std::optional<Earlier> earlier;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,211 @@
+#include "core/model/learnt_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace qdmd {
+namespace {
+
+// Something that changes line ends, or takes the eighth bit, shows.
+constexpr std::array<uint8_t, 8> kMagic = {0x89, 'Q', 'D', 'M', 'D', '\r', '\n', 0x1a};
+constexpr size_t kChecksumBytes = 8;
+constexpr uint32_t kHasLimits = 1, kHasEarlier = 2, kAllSections = kHasLimits | kHasEarlier;
+// More than an engine takes.
+constexpr uint64_t kMostPixels = uint64_t{1} << 36;
+
+struct Header {
+  uint32_t version = 0, width = 0, height = 0, colours = 0, sections = 0, rows = 0, cols = 0;
+  uint32_t zero = 0;
+  double noise = 0;
+  uint64_t bytes = 0;
+
+  uint64_t pixels() const { return uint64_t{width} * height; }
+  uint64_t cells() const { return uint64_t{rows} * cols; }
+  // What it says that the file holds. Not before the numbers are known to be sane.
+  uint64_t bytes_of_all() const {
+    uint64_t planes = kChannels;
+    if (sections & kHasLimits) planes += 1;
+    if (sections & kHasEarlier) planes += kChannels + 1;
+    return kLearntHeaderBytes + planes * pixels() + 2 * sizeof(float) * cells() + kChecksumBytes;
+  }
+};
+
+class Writer {
+ public:
+  explicit Writer(size_t bytes) { bytes_.reserve(bytes); }
+
+  template <typename Unsigned>
+  void put(Unsigned value) {
+    for (size_t i = 0; i < sizeof value; ++i)
+      bytes_.push_back(static_cast<uint8_t>(value >> (8 * i)));
+  }
+  void put_plane(std::span<const uint8_t> plane) {
+    bytes_.insert(bytes_.end(), plane.begin(), plane.end());
+  }
+  void put_numbers(const std::vector<float>& numbers) {
+    for (float number : numbers) put(std::bit_cast<uint32_t>(number));
+  }
+  const std::vector<uint8_t>& bytes() const { return bytes_; }
+  std::vector<uint8_t> take() { return std::move(bytes_); }
+
+ private:
+  std::vector<uint8_t> bytes_;
+};
+
+// Reads what is known to be there.
+class Reader {
+ public:
+  explicit Reader(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+
+  template <typename Unsigned>
+  Unsigned number() {
+    Unsigned value = 0;
+    for (size_t i = 0; i < sizeof value; ++i)
+      value = static_cast<Unsigned>(value | static_cast<Unsigned>(bytes_[i]) << (8 * i));
+    bytes_ = bytes_.subspan(sizeof value);
+    return value;
+  }
+  std::vector<uint8_t> plane(size_t pixels) {
+    std::vector<uint8_t> plane(bytes_.begin(),
+                               bytes_.begin() + static_cast<std::ptrdiff_t>(pixels));
+    bytes_ = bytes_.subspan(pixels);
+    return plane;
+  }
+  std::vector<float> numbers(size_t count) {
+    std::vector<float> all(count);
+    for (float& one : all) one = std::bit_cast<float>(number<uint32_t>());
+    return all;
+  }
+
+ private:
+  std::span<const uint8_t> bytes_;
+};
+
+uint64_t checksum(std::span<const uint8_t> bytes) {
+  uint64_t hash = 0xcbf29ce484222325;
+  for (uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001b3;
+  return hash;
+}
+
+Status bad(std::string message) { return {Status::Code::bad_file, std::move(message)}; }
+
+Status damaged(const std::string& what) {
+  return bad("it is damaged (" + what + "): save it again, or take another copy.");
+}
+
+// Of a file of so many bytes in all.
+Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header) {
+  if (bytes.empty()) return bad("it is empty: save it again, or take another copy.");
+  const size_t seen = std::min(bytes.size(), kMagic.size());
+  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(seen), kMagic.begin()))
+    return bad("it is no file that qdmdbackground has saved: check the name.");
+  if (bytes.size() < kLearntHeaderBytes) return damaged("it ends too early");
+  Reader reader(bytes.subspan(kMagic.size()));
+  Header h;
+  for (uint32_t* number :
+       {&h.version, &h.width, &h.height, &h.colours, &h.sections, &h.rows, &h.cols, &h.zero})
+    *number = reader.number<uint32_t>();
+  h.noise = std::bit_cast<double>(reader.number<uint64_t>());
+  h.bytes = reader.number<uint64_t>();
+  if (h.version != kLearntVersion)
+    return bad("it has version " + std::to_string(h.version) +
+               " of the format, and this qdmdbackground reads version " +
+               std::to_string(kLearntVersion) + ": save it again with this one.");
+  constexpr uint32_t kMost = std::numeric_limits<int32_t>::max();
+  // Cells are no smaller than pixels.
+  const bool grid = h.sections & kHasEarlier
+                        ? h.rows > 0 && h.cols > 0 && h.rows <= h.height && h.cols <= h.width
+                        : h.rows == 0 && h.cols == 0;
+  const bool sane = h.width > 0 && h.height > 0 && h.width <= kMost && h.height <= kMost &&
+                    h.pixels() <= kMostPixels &&
+                    h.colours <= static_cast<uint32_t>(Colours::grey) &&
+                    (h.sections & ~kAllSections) == 0 && grid && h.zero == 0 &&
+                    std::isfinite(h.noise) && h.noise >= 0;
+  if (!sane || h.bytes != h.bytes_of_all()) return damaged("its first bytes make no sense");
+  if (h.bytes != all)
+    return damaged("it has " + std::to_string(all) + " bytes in place of " +
+                   std::to_string(h.bytes));
+  *header = h;
+  return {};
+}
+
+bool are_weights(const std::vector<float>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(),
+                     [](float number) { return std::isfinite(number) && number >= 0; });
+}
+
+}  // namespace
+
+std::vector<uint8_t> pack(const Learnt& learnt) {
+  Header header;
+  header.width = static_cast<uint32_t>(learnt.width);
+  header.height = static_cast<uint32_t>(learnt.height);
+  if (!learnt.limits.empty()) header.sections |= kHasLimits;
+  if (learnt.earlier) {
+    header.sections |= kHasEarlier;
+    header.rows = static_cast<uint32_t>(learnt.earlier->rows);
+    header.cols = static_cast<uint32_t>(learnt.earlier->cols);
+  }
+  const uint64_t bytes = header.bytes_of_all();
+  Writer writer(bytes);
+  writer.put_plane(kMagic);
+  for (uint32_t number :
+       {kLearntVersion, header.width, header.height, static_cast<uint32_t>(learnt.colours),
+        header.sections, header.rows, header.cols, uint32_t{0}})
+    writer.put(number);
+  writer.put(std::bit_cast<uint64_t>(learnt.noise));
+  writer.put(bytes);
+  for (const auto& level : learnt.level) writer.put_plane(level);
+  writer.put_plane(learnt.limits);
+  if (learnt.earlier) {
+    for (const auto& level : learnt.earlier->level) writer.put_plane(level);
+    writer.put_plane(learnt.earlier->spread);
+    writer.put_numbers(learnt.earlier->weight);
+    writer.put_numbers(learnt.earlier->limit);
+  }
+  writer.put(checksum(writer.bytes()));
+  return writer.take();
+}
+
+Status check_header(std::span<const uint8_t> header, uint64_t bytes) {
+  Header h;
+  return read_header(header, bytes, &h);
+}
+
+Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
+  Header header;
+  if (Status status = read_header(bytes, bytes.size(), &header); !status.ok()) return status;
+  const auto checked = bytes.first(bytes.size() - kChecksumBytes);
+  if (Reader(bytes.last(kChecksumBytes)).number<uint64_t>() != checksum(checked))
+    return damaged("its checksum is wrong");
+  Reader reader(checked.subspan(kLearntHeaderBytes));
+  const auto pixels = static_cast<size_t>(header.pixels());
+  const auto cells = static_cast<size_t>(header.cells());
+  Learnt read;
+  read.width = static_cast<int>(header.width);
+  read.height = static_cast<int>(header.height);
+  read.colours = static_cast<Colours>(header.colours);
+  read.noise = header.noise;
+  for (auto& level : read.level) level = reader.plane(pixels);
+  if (header.sections & kHasLimits) read.limits = reader.plane(pixels);
+  if (header.sections & kHasEarlier) {
+    Learnt::Earlier& earlier = read.earlier.emplace();
+    for (auto& level : earlier.level) level = reader.plane(pixels);
+    earlier.spread = reader.plane(pixels);
+    earlier.rows = static_cast<int>(header.rows);
+    earlier.cols = static_cast<int>(header.cols);
+    earlier.weight = reader.numbers(cells);
+    earlier.limit = reader.numbers(cells);
+    if (!are_weights(earlier.weight) || !are_weights(earlier.limit))
+      return damaged("it has numbers that are none");
+  }
+  *learnt = std::move(read);
+  return {};
+}
+
+}  // namespace qdmd
