@@ -27,7 +27,8 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
   constexpr double kMargin = 2.5;
   const double frames = learner.solve_seconds(options.window_size) * options.frame_rate;
   if (!(frames > kAtOnce)) return 0;
-  return static_cast<int>(std::min<double>(std::ceil(kMargin * frames), (options.window_size + 3) / 4));
+  return static_cast<int>(
+      std::min<double>(std::ceil(kMargin * frames), (options.window_size + 3) / 4));
 }
 
 EngineLayout layout_with(const EngineOptions& options, const Learner& learner, int width,
