@@ -20,8 +20,8 @@ GType gst_qdmd_background_output_get_type() {
 GType gst_qdmd_background_mode_get_type() {
   static const GEnumValue values[] = {
       {int(qdmd::Mode::batch),
-       "Fill a window, solve, send its frames, each with its own L(t); a latency of "
-       "window-size - 1 frames",
+       "Fill a window, solve, send a frame for each that comes, each with its own L(t); a latency "
+       "of window-size - 1 frames and what a solve takes",
        "batch"},
       {int(qdmd::Mode::live),
        "Send each frame at once, against the newest model; solve every hop-size frames on the last "
