@@ -271,9 +271,13 @@ GstFlowReturn drain(GstQdmdBackground* self) {
   return flow;
 }
 
-// True where `input` does not follow the frame before: time goes back, or leaves out more than a
-// camera loses. Notes where the next frame is expected.
-static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
+enum class Step {
+  onwards,    // as far as anybody knows
+  backwards,  // the frame that ends where the one before it began: reverse playback
+  jump        // back, or on by more than a camera loses
+};
+// From the frame before to `input`. Notes where the next frame is expected.
+static Step step_to(GstQdmdBackground* self, GstBuffer* input) {
   GstClockTime* next = &self->state->next_pts;
   const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
   const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
@@ -283,15 +287,22 @@ static bool time_jumps(GstQdmdBackground* self, GstBuffer* input) {
     frame = gst_util_uint64_scale(GST_SECOND, guint64(GST_VIDEO_INFO_FPS_D(info)),
                                   guint64(GST_VIDEO_INFO_FPS_N(info)));
   *next = GST_CLOCK_TIME_NONE;
-  // Frames of reverse playback come in reverse order.
-  if (!GST_CLOCK_TIME_IS_VALID(pts) || GST_BASE_TRANSFORM(self)->segment.rate < 0) return false;
+  if (!GST_CLOCK_TIME_IS_VALID(pts)) return Step::onwards;
   if (!GST_CLOCK_TIME_IS_VALID(frame)) frame = 0;
+  if (GST_BASE_TRANSFORM(self)->segment.rate < 0) {
+    // Frames come in reverse order.
+    *next = pts;
+    const bool meets = GST_CLOCK_TIME_IS_VALID(expected) &&
+                       ABS(GST_CLOCK_DIFF(expected, pts + frame)) <= GstClockTimeDiff(frame / 2);
+    return meets ? Step::backwards : Step::onwards;
+  }
   *next = pts + frame;
-  if (!GST_CLOCK_TIME_IS_VALID(expected)) return false;
+  if (!GST_CLOCK_TIME_IS_VALID(expected)) return Step::onwards;
   // Rounded timestamps may fall short by some.
-  if (pts + MAX(frame, 10 * GST_MSECOND) < expected) return true;
+  if (pts + MAX(frame, 10 * GST_MSECOND) < expected) return Step::jump;
   // Without a rate nobody knows how long a frame lasts.
-  return has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
+  const bool gap = has_rate && pts > expected + MAX(kMostGap, kMostGapFrames * frame);
+  return gap ? Step::jump : Step::onwards;
 }
 
 // Warns once of each property that was set and has no effect with this method.
@@ -352,12 +363,15 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
   GST_OBJECT_LOCK(self);
   const bool reset = std::exchange(self->state->reset_asked, false);
   GST_OBJECT_UNLOCK(self);
-  const bool jump = time_jumps(self, input);
+  const Step step = step_to(self, input);
+  const bool jump = step == Step::jump;
   if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
   warn_of_breaks(self, jump);
   // The base class keeps is_discont set until something was pushed, which can be a window later:
   // the buffer's own flag says where time breaks.
-  if (GST_BUFFER_IS_DISCONT(input) || jump || reset) {
+  // GstBaseSrc sets it on every buffer of reverse playback, whatever was before.
+  const bool discont = GST_BUFFER_IS_DISCONT(input) && step != Step::backwards;
+  if (discont || jump || reset) {
     const GstFlowReturn flow = drain(self);
     if (flow != GST_FLOW_OK) return flow;
   }

@@ -172,6 +172,25 @@ TEST_F(HalfAWindow, ReversePlaybackBeginsANewOne) {
     EXPECT_EQ((40 - i) * kFrame, GST_BUFFER_PTS(out[i].get())) << i;
 }
 
+// As GstBaseSrc plays backwards: each buffer says that it does not follow the one before.
+TEST_F(HalfAWindow, ReversePlaybackOfASourceThatMarksEachFrame) {
+  const GstSegment segment = segment_from(0, -1);
+  send(gst_event_new_segment(&segment));
+  expect_frames(0, 3);
+  const auto push = [this](int t) {
+    auto buffer = stream_.make_frame(t, paint_mover);
+    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream_.harness(), buffer.release()));
+  };
+  for (int t = 60; t > 60 - kWindow + 1; --t) push(t);
+  EXPECT_TRUE(stream_.take_all().empty());
+  push(60 - kWindow + 1);
+  EXPECT_EQ(1u, stream_.take_all().size());
+  // Another part of the stream, which the buffer's flag is right about.
+  push(20);
+  EXPECT_EQ(static_cast<size_t>(kWindow - 1), stream_.take_all().size());
+}
+
 TEST_F(HalfAWindow, AnotherPlaybackRateBeginsANewOne) {
   const GstSegment segment = segment_from(0, 2);
   send(gst_event_new_segment(&segment));
