@@ -45,11 +45,14 @@ TEST_P(Allocations, OfTheDefaultInBatch) {
   for (const auto& [more, most] : {std::pair{"", 0}, {" regions=true", 4}, {" output=mask", 0}})
     for (const char* threads : {"1", "2"}) {
       SCOPED_TRACE(std::string("n-threads ") + threads + more);
-      // A solve beside the frames has memory of its own.
+      const std::string properties = std::string("window-size=12 n-threads=") + threads + more;
+      // A solve that goes on beside the next frame has memory of its own: nothing else in any other
+      // frame, and nothing else in this one's thread.
+      for_frames(
+          properties, GetParam(), 24, 36, [](int t) { return t % 12 == 11 || t % 12 == 0; }, most);
       allocator::see_only_this_thread(true);
       for_frames(
-          std::string("window-size=12 n-threads=") + threads + more, GetParam(), 24, 36,
-          [](int t) { return t % 12 == 11; }, most);
+          properties, GetParam(), 24, 36, [](int t) { return t % 12 == 11; }, most);
       allocator::see_only_this_thread(false);
     }
 }
