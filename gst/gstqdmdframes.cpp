@@ -380,19 +380,27 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
     // Loaded after the reset was asked for.
     if (!apply_loaded(self)) return GST_FLOW_ERROR;
   }
-  self->state->came = g_get_monotonic_time();
   return GST_FLOW_OK;
 }
 
-// After a frame came: whether the next to leave waits longer than sinks were told.
-static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, bool solved) {
+// Of the clock that sinks go by; before there is one, of the system's.
+static GstClockTime time_now(GstQdmdBackground* self) {
+  ClockPtr clock(gst_element_get_clock(GST_ELEMENT(self)));
+  if (!clock) clock.reset(gst_system_clock_obtain());
+  return gst_clock_get_time(clock.get());
+}
+
+// After a frame that came at the time `came`: whether the next to leave waits longer than sinks
+// were told.
+static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, GstClockTime came) {
   State* state = self->state;
-  const gint64 held = solved ? g_get_monotonic_time() - state->came : 0;
+  const GstClockTime now = state->engine.held_up() ? time_now(self) : came,
+                     held = now > came ? now - came : 0;
   GST_OBJECT_LOCK(self);
   bool grew = state->latency.frame_in(timestamp);
+  grew |= state->latency.held_up(held);
   if (state->engine.ready())
-    grew |= state->latency.frame_out(GST_BUFFER_PTS(state->shells.at(0)),
-                                     guint64(MAX(held, 0)) * GST_USECOND);
+    grew |= state->latency.frame_out(GST_BUFFER_PTS(state->shells.at(0)), held);
   const GstClockTime latency = state->latency.promised();
   GST_OBJECT_UNLOCK(self);
   if (!grew) return;
@@ -406,6 +414,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
   if (state->engine.ready()) drop_frames(self);
 
+  const GstClockTime came = time_now(self);
   GST_OBJECT_LOCK(self);
   const bool freeze = state->settings.freeze;
   const int threads = state->settings.engine.threads;
@@ -439,9 +448,8 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
     }
   }
   publish_report(self, 1, 0);
-  const bool solved = state->engine.solves() != state->solves_told;
   tell_of_solve(self, nullptr);
-  follow_latency(self, GST_BUFFER_PTS(buffer.get()), solved);
+  follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;
 }
 

@@ -53,8 +53,7 @@ struct State {
   guint64 solves_told = 0;             // of the engine's
   guint breaks = 0;                    // in time, one after another, with a frame between them
   bool warned_of_breaks = false;
-  gint64 came = 0;   // the newest frame, in microseconds of the system's clock
-  guint warned = 0;  // settings without effect, a bit for each id
+  guint warned = 0;                             // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };
 

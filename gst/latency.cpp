@@ -18,7 +18,7 @@ bool Latency::configure(guint64 frames, gint rate_n, gint rate_d) {
   const bool known = rate_n > 0 && rate_d > 0;
   const GstClockTime before = promised_;
   frames_ = frames;
-  promised_ =
+  promised_ = frames_time_ =
       std::min(kMost, gst_util_uint64_scale(frames * GST_SECOND, known ? guint64(rate_d) : 1,
                                             known ? guint64(rate_n) : kAssumedRate));
   restart();
@@ -47,7 +47,13 @@ bool Latency::frame_in(GstClockTime timestamp) {
   const GstClockTime span = timestamp - first_,
                      needed = std::min(kMost, gst_util_uint64_scale(span, frames_, intervals));
   // Timestamps are rounded, and cameras' frames come a bit early or late.
+  frames_time_ = std::max(frames_time_, needed);
   return needed > promised_ + promised_ / 16 && promise(needed + span / intervals);
+}
+
+bool Latency::held_up(GstClockTime held) {
+  held = std::min(held, kMost);
+  return frames_time_ + held > promised_ + kInHand && promise(frames_time_ + held + held / 4);
 }
 
 bool Latency::frame_out(GstClockTime timestamp, GstClockTime held) {

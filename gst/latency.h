@@ -26,6 +26,9 @@ class Latency {
   // Each returns true where the promise grew: a LATENCY message is due.
   // A frame came, after the one before in time.
   bool frame_in(GstClockTime timestamp);
+  // A solve held the newest frame up for `held`, and whichever frame leaves with it, if one does:
+  // the next solve is promised to.
+  bool held_up(GstClockTime held);
   // The frame of that timestamp leaves; a solve held it up for `held` (0: none did) after the
   // newest came.
   bool frame_out(GstClockTime timestamp, GstClockTime held);
@@ -35,6 +38,7 @@ class Latency {
 
   guint64 frames_ = 0;
   GstClockTime promised_ = 0;
+  GstClockTime frames_time_ = 0;  // of what was promised, what `frames_` take by themselves
   GstClockTime first_ = GST_CLOCK_TIME_NONE, newest_ = GST_CLOCK_TIME_NONE;
   guint64 intervals_ = 0;  // between these two
 };

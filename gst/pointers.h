@@ -25,6 +25,11 @@ struct UnrefCaps {
 };
 using CapsPtr = std::unique_ptr<GstCaps, UnrefCaps>;
 
+struct UnrefClock {
+  void operator()(GstClock* clock) const { gst_object_unref(clock); }
+};
+using ClockPtr = std::unique_ptr<GstClock, UnrefClock>;
+
 struct FreeChars {
   void operator()(gchar* chars) const { g_free(chars); }
 };

@@ -76,7 +76,7 @@ void BatchSchedule::add_group() {
   const SnapshotRange span = SnapshotRange(frames().window()).newest(collected());
   work_ = Work{span, std::exchange(collection_->not_added, 0)};
   // What a std::function holds without memory of its own.
-  side().start([this] { background().learner().add(work_->span, work_->fresh, {}); });
+  start([this] { background().learner().add(work_->span, work_->fresh, {}); });
 }
 
 // The window that is collected waits from now on, and is solved.
@@ -93,10 +93,12 @@ void BatchSchedule::end_window(bool at_once) {
   work_ = Work{span, count < size ? count : window.not_added, background().fixed_threshold()};
   // Reads how many frames there are.
   if (background().learner().in_one_piece()) background().begin(span);
-  if (at_once)
-    solve();
-  else
-    side().start([this] { solve(); });
+  if (!at_once) {
+    start([this] { solve(); });
+    return;
+  }
+  hold_up();
+  solve();
 }
 
 void BatchSchedule::solve() {

@@ -87,6 +87,7 @@ Status Engine::push(const ImageView& frame) {
   const Clock::Span span(clock_, Clock::frames);
   return flushed_if_it_throws([&]() -> Status {
     workers_->follow();
+    schedule_->begin_push();
     if (schedule_->push(frame, freeze_, &queue_)) return {};
     flush();
     return alpha_refused();

@@ -33,6 +33,9 @@ class Engine {
 
   // Copies a frame in.
   Status push(const ImageView& frame);
+  // The newest push() took longer than a frame alone does: work of a solve was done in it, for want
+  // of a thread or because it was due, or waited for.
+  bool held_up() const { return schedule_ && schedule_->held_up(); }
   // True while pop() has a frame.
   bool ready() const { return queue_.ready > 0; }
   // Writes the next frame's picture. Call only while ready(); `out` has the configured size.

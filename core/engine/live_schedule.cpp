@@ -81,7 +81,7 @@ void LiveSchedule::begin_work() {
 void LiveSchedule::run(bool at_once) {
   fixed_threshold_ = background().fixed_threshold();
   if (!at_once) {
-    side().start([this] { work(); });
+    start([this] { work(); });
     return;
   }
   while (group_ || build_) work();

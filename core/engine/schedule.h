@@ -1,6 +1,9 @@
 // When frames are learnt from, and when they may leave: what batch and live differ in.
 #pragma once
 
+#include <functional>
+#include <utility>
+
 #include "core/base/image_view.h"
 #include "core/base/status.h"
 #include "core/engine/background.h"
@@ -37,6 +40,10 @@ class Schedule {
   // Takes a frame in. freeze: the background is held once there is one. False: the frame has alpha
   // for which there is no room (FrameStore::append).
   virtual bool push(const ImageView& frame, bool freeze, Queue* queue) = 0;
+  // Before each push().
+  void begin_push() { held_up_ = false; }
+  // Work of a solve was done in the newest push(), or waited for.
+  bool held_up() const { return held_up_; }
   // All that waits becomes ready. The next frame begins a new window.
   virtual void drain(Queue* queue) = 0;
   // Drops the work that is under way, and all frames. The background is forgotten, too.
@@ -57,14 +64,22 @@ class Schedule {
   Workers& workers() const { return *stage_.workers; }
   SideThread& side() const { return stage_.workers->side(); }
   Pace& pace() const { return *stage_.pace; }
+  // Runs `work` beside the caller, where there is a thread for it. wait() comes before the next.
+  void start(std::function<void()> work) {
+    if (side().start(std::move(work))) hold_up();
+  }
   // For the side thread's work, whose time it charges itself. Throws what that threw.
-  void wait() const {
+  void wait() {
     const Clock::Span span(*stage_.clock, Clock::waiting);
+    if (!side().idle()) hold_up();
     side().finish();
   }
+  // For work of a solve that is done at once.
+  void hold_up() { held_up_ = true; }
 
  private:
   Stage stage_;
+  bool held_up_ = false;
 };
 
 }  // namespace qdmd

@@ -59,17 +59,18 @@ void SideThread::loop() noexcept {
   }
 }
 
-void SideThread::start(std::function<void()> work) {
+bool SideThread::start(std::function<void()> work) {
   work_ = std::move(work);
   if (!thread_.joinable()) {
     run();
-    return;
+    return true;
   }
   {
     const std::lock_guard lock(mutex_);
     busy_ = true;
   }
   changed_.notify_all();
+  return false;
 }
 
 bool SideThread::idle() {

@@ -22,8 +22,8 @@ class SideThread {
 
   // As `active` of the constructor, from the next start() on. While nothing runs.
   void set_active(bool active);
-  // Runs `work`; the one before must have been finished.
-  void start(std::function<void()> work);
+  // Runs `work`; the one before must have been finished. True: it is done, there was no thread.
+  bool start(std::function<void()> work);
   // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
   void finish();
   // The same, and forgets what it threw: nobody waits for the result.

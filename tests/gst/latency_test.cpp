@@ -148,6 +148,28 @@ TEST(Latency, FramesThatASolveHeldUp) {
   EXPECT_EQ(grown, latency.promised());
 }
 
+// Where the solve is done with a frame with which none leaves, as the first one is, or with another
+// frame than the one that brings its background into use.
+TEST(Latency, OfASolveThatHeldUpAFrameWithWhichNoneLeaves) {
+  Latency latency;
+  latency.configure(24, 25, 1);
+  const GstClockTime waited = 24 * GST_SECOND / 25;
+  for (GstClockTime held : std::initializer_list<GstClockTime>{0, GST_MSECOND, 20 * GST_MSECOND})
+    EXPECT_FALSE(latency.held_up(held));
+  EXPECT_EQ(waited, latency.promised());
+  EXPECT_TRUE(latency.held_up(60 * GST_MSECOND));
+  const GstClockTime grown = latency.promised();
+  EXPECT_GE(grown, waited + 60 * GST_MSECOND);
+  EXPECT_LE(grown, waited + 80 * GST_MSECOND);
+  EXPECT_FALSE(latency.held_up(65 * GST_MSECOND)) << "it does not add up";
+  EXPECT_EQ(grown, latency.promised());
+  // Of frames that come more slowly than was known.
+  frames_in(&latency, 0, 100, GST_SECOND / 10);
+  EXPECT_TRUE(latency.held_up(500 * GST_MSECOND));
+  EXPECT_GE(latency.promised(), 24 * GST_SECOND / 10 + 500 * GST_MSECOND);
+  EXPECT_LE(latency.promised(), 25 * GST_SECOND / 10 + 650 * GST_MSECOND);
+}
+
 TEST(Latency, OfLiveIsNone) {
   Latency latency;
   EXPECT_FALSE(latency.configure(0, 25, 1));
@@ -155,6 +177,7 @@ TEST(Latency, OfLiveIsNone) {
   EXPECT_EQ(0, frames_in(&latency, 0, 100, GST_SECOND));
   EXPECT_FALSE(latency.frame_out(99 * GST_SECOND, 10 * GST_SECOND));
   EXPECT_FALSE(latency.frame_out(0, 10 * GST_SECOND));
+  EXPECT_FALSE(latency.held_up(10 * GST_SECOND));
   EXPECT_EQ(0u, latency.promised());
 }
 
@@ -175,8 +198,12 @@ TEST(Latency, IsNeverSoLongThatASumOverflows) {
       EXPECT_LT(latency.promised(), kMost);
       latency.frame_out(0, 0);
       EXPECT_LT(latency.promised(), kMost);
-      latency.frame_out(0, GST_CLOCK_TIME_NONE / 4);
-      EXPECT_LT(latency.promised(), kMost);
+      for (GstClockTime held : {GST_CLOCK_TIME_NONE / 4, GST_CLOCK_TIME_NONE - 1}) {
+        latency.frame_out(0, held);
+        EXPECT_LT(latency.promised(), kMost);
+        latency.held_up(held);
+        EXPECT_LT(latency.promised(), kMost);
+      }
     }
   }
   latency.configure(2047, 1, 2147483647);
