@@ -5,7 +5,6 @@
 #include <new>
 #include <utility>
 
-#include "core/foreground/regions.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdlearnt.h"
 
@@ -91,6 +90,7 @@ void close(GstQdmdBackground* self) {
   State* state = self->state;
   state->mask = {};
   state->residual = {};
+  state->regions = {};
   const std::lock_guard lock(state->engine_lock);
   state->engine.close();
   state->io.clear();
@@ -168,7 +168,7 @@ static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
 }
 
 // Regions of the frame that comes out next.
-static std::vector<Region> next_regions(GstQdmdBackground* self, int least_area) {
+static const std::vector<Region>& next_regions(GstQdmdBackground* self, int least_area) {
   State* state = self->state;
   const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
   const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
@@ -176,7 +176,7 @@ static std::vector<Region> next_regions(GstQdmdBackground* self, int least_area)
   state->mask.resize(pixels);
   state->residual.resize(pixels);
   state->engine.foreground(state->mask.data(), state->residual.data());
-  return find_regions(state->mask.data(), state->residual.data(), width, height, least_area);
+  return state->regions.find(state->mask.data(), state->residual.data(), width, height, least_area);
 }
 
 static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
@@ -214,7 +214,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     drop_frames(self);
     return flow;
   }
-  std::vector<Region> regions;
+  const std::vector<Region>* regions = nullptr;
   {
     MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
     if (!frame) {
@@ -225,7 +225,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     const bool written = with_engine(self, [&](Engine& engine) {
       const Clock::Span span(engine.clock(), Clock::frames);
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
-      if (settings.regions) regions = next_regions(self, settings.regions_min_area);
+      if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       state->io.write(&frame, settings.output,
                       [&](const MutableImageView& view) { engine.pop(settings.output, view); });
       note_solve(self, shell.get());
@@ -236,7 +236,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       return GST_FLOW_ERROR;
     }
   }
-  attach(buffer.get(), regions);
+  if (regions) attach(buffer.get(), *regions);
   publish_report(self, 0, 1);
   tell_of_solve(self, shell.get());
   *out = buffer.release();

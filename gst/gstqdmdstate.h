@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/engine/engine.h"
+#include "core/foreground/regions.h"
 #include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
 #include "gst/frameio.h"
@@ -50,8 +51,9 @@ struct State {
   // upstream's pools never wait for a window.
   BufferQueue shells;
   std::vector<guint8> mask, residual;  // for regions
-  guint64 solves_told = 0;             // of the engine's
-  guint breaks = 0;                    // in time, one after another, with a frame between them
+  RegionFinder regions;
+  guint64 solves_told = 0;  // of the engine's
+  guint breaks = 0;         // in time, one after another, with a frame between them
   bool warned_of_breaks = false;
   guint warned = 0;                             // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected

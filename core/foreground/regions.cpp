@@ -42,31 +42,44 @@ void merge_overlapping(std::vector<Region>* regions) {
 
 // Gives parts of `white` that are near to each other one label; returns the number of labels.
 // OpenCV's words for memory that runs out become those of the language.
-int label_parts(const cv::Mat& white, cv::Mat* labels) try {
+int label_parts(const cv::Mat& white, cv::Mat* joined, cv::Mat* labels) try {
   const int gap =
       std::max(1, static_cast<int>(std::lround(std::min(white.cols, white.rows) / 120.0)));
-  cv::Mat joined;
-  cv::dilate(white, joined, cv::getStructuringElement(cv::MORPH_RECT, {2 * gap + 1, 2 * gap + 1}));
-  return cv::connectedComponents(joined, *labels, 8, CV_32S);
+  cv::dilate(white, *joined, cv::getStructuringElement(cv::MORPH_RECT, {2 * gap + 1, 2 * gap + 1}));
+  return cv::connectedComponents(*joined, *labels, 8, CV_32S);
 } catch (const cv::Exception& error) {
   if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
   throw;
 }
 
+// Of the pixels with one label.
+struct Sum {
+  int left = INT32_MAX, top = INT32_MAX, right = -1, bottom = -1, area = 0;
+  int64_t residual = 0;
+};
+
 }  // namespace
 
-std::vector<Region> find_regions(const uint8_t* mask, const uint8_t* residual, int width,
-                                 int height, int least_area) {
+struct RegionFinder::Memory {
+  cv::Mat joined, labels;
+  std::vector<Sum> sums;  // a label's at its number
+  std::vector<Region> regions;
+};
+
+RegionFinder::RegionFinder() = default;
+RegionFinder::RegionFinder(RegionFinder&&) noexcept = default;
+RegionFinder& RegionFinder::operator=(RegionFinder&&) noexcept = default;
+RegionFinder::~RegionFinder() = default;
+
+const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t* residual,
+                                              int width, int height, int least_area) {
+  if (!memory_) memory_ = std::make_unique<Memory>();
+  auto& [joined, labels, sums, regions] = *memory_;
   // OpenCV has no const pictures.
   const cv::Mat white(height, width, CV_8UC1, const_cast<uint8_t*>(mask));
-  cv::Mat labels;
-  const int count = label_parts(white, &labels);
+  const int count = label_parts(white, &joined, &labels);
 
-  struct Sum {
-    int left = INT32_MAX, top = INT32_MAX, right = -1, bottom = -1, area = 0;
-    int64_t residual = 0;
-  };
-  std::vector<Sum> sums(static_cast<size_t>(count));
+  sums.assign(static_cast<size_t>(count), {});
   for (int y = 0; y < height; ++y) {
     const int* label = labels.ptr<int>(y);
     const uint8_t* inside = white.ptr<uint8_t>(y);
@@ -84,7 +97,7 @@ std::vector<Region> find_regions(const uint8_t* mask, const uint8_t* residual, i
   }
   const double least =
       least_area > 0 ? least_area : std::max(4.0, static_cast<double>(width) * height / 2000);
-  std::vector<Region> regions;
+  regions.clear();
   for (const Sum& sum : sums)
     if (sum.area > 0 && sum.area >= least)
       regions.push_back({sum.left, sum.top, sum.right - sum.left + 1, sum.bottom - sum.top + 1,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace qdmd {
@@ -13,12 +14,28 @@ struct Region {
   double mean_residual = 0;                 // of these, levels
 };
 
-// The regions of a picture of width x height pixels, the largest first. mask: 255 where foreground,
-// else 0; residual: levels. Parts nearer to each other than about 1/60 of the short side are one
-// region, and so are regions whose boxes overlap. Regions of fewer than least_area pixels are left
-// out; 0: 1/2000 of the picture, at least 4. At most kMostRegions. Throws std::bad_alloc.
-constexpr size_t kMostRegions = 64;
-std::vector<Region> find_regions(const uint8_t* mask, const uint8_t* residual, int width,
-                                 int height, int least_area);
+// Looks at one picture after another, with the same memory.
+class RegionFinder {
+ public:
+  static constexpr size_t kMostRegions = 64;
+
+  // Takes memory with the first picture.
+  RegionFinder();
+  RegionFinder(RegionFinder&&) noexcept;
+  RegionFinder& operator=(RegionFinder&&) noexcept;
+  ~RegionFinder();
+
+  // The regions of a picture of width x height pixels, the largest first, until the next call.
+  // mask: 255 where foreground, else 0; residual: levels. Parts nearer to each other than about
+  // 1/60 of the short side are one region, and so are regions whose boxes overlap. Regions of fewer
+  // than least_area pixels are left out; 0: 1/2000 of the picture, at least 4. At most
+  // kMostRegions. Throws std::bad_alloc.
+  const std::vector<Region>& find(const uint8_t* mask, const uint8_t* residual, int width,
+                                  int height, int least_area);
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
 
 }  // namespace qdmd

@@ -23,7 +23,11 @@ struct Mask {
       }
   }
   std::vector<Region> regions(int least_area = 0) const {
-    return find_regions(white.data(), residual.data(), width, height, least_area);
+    RegionFinder finder;
+    return regions(&finder, least_area);
+  }
+  std::vector<Region> regions(RegionFinder* finder, int least_area = 0) const {
+    return finder->find(white.data(), residual.data(), width, height, least_area);
   }
 };
 
@@ -106,7 +110,26 @@ TEST(Regions, AreNotCountless) {
   Mask mask(1280, 960);
   for (int y = 4; y < 940; y += 40)
     for (int x = 4; x < 1240; x += 40) mask.box(x, y, 3, 3, 50);
-  EXPECT_EQ(mask.regions(1).size(), kMostRegions);
+  EXPECT_EQ(mask.regions(1).size(), RegionFinder::kMostRegions);
+}
+
+// Nothing of one picture is left in the next, whatever its size.
+TEST(Regions, OfOnePictureAfterAnother) {
+  Mask many(320, 240), one(320, 240), small(40, 30);
+  for (int k = 0; k < 5; ++k) many.box(10 + 60 * k, 20, 20, 30 + k, 60);
+  one.box(100, 100, 30, 30, 90);
+  small.box(3, 4, 10, 12, 30);
+  RegionFinder finder;
+  for (const Mask* mask : {&many, &one, &small, &many, &small, &one}) {
+    const auto expected = mask->regions(), found = mask->regions(&finder);
+    ASSERT_EQ(found.size(), expected.size());
+    for (size_t k = 0; k < found.size(); ++k) {
+      const Region& region = expected[k];
+      expect_box(found[k], region.x, region.y, region.width, region.height);
+      EXPECT_EQ(found[k].area, region.area);
+      EXPECT_EQ(found[k].mean_residual, region.mean_residual);
+    }
+  }
 }
 
 }  // namespace
