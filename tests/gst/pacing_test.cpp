@@ -41,16 +41,16 @@ GstPadProbeReturn tell_rate(GstPad*, GstPadProbeInfo* info, gpointer rate) {
 
 class Paced {
  public:
-  Paced(const std::string& element, int told_rate, int frames) {
+  // source: its frames are live. told_rate: what the caps say.
+  Paced(const std::string& source, const std::string& element, int told_rate) {
     GError* error = nullptr;
     pipeline_ = gst_parse_launch(
-        ("videotestsrc is-live=true num-buffers=" + std::to_string(frames) +
-         " ! video/x-raw,format=RGB,width=64,height=48,framerate=25/1 ! " + element +
+        (source + " ! " + element +
          " name=q ! fakesink name=s sync=true qos=true signal-handoffs=true processing-deadline=0")
             .c_str(),
         &error);
     EXPECT_EQ(nullptr, error) << error->message;
-    GstElement* tested = gst_bin_get_by_name(GST_BIN(pipeline_), "q");
+    GstElement* tested = this->element("q");
     GstPad* pad = gst_element_get_static_pad(tested, "sink");
     gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, tell_rate,
                       GINT_TO_POINTER(told_rate), nullptr);
@@ -58,45 +58,55 @@ class Paced {
     gst_object_unref(tested);
     clock_ = gst_test_clock_new();
     gst_pipeline_use_clock(GST_PIPELINE(pipeline_), clock_);
+    bus_ = gst_element_get_bus(pipeline_);
     arrivals.clock = clock_;
-    arrivals.sink = gst_bin_get_by_name(GST_BIN(pipeline_), "s");
+    arrivals.sink = this->element("s");
     g_signal_connect(arrivals.sink, "handoff", G_CALLBACK(note_arrival), &arrivals);
   }
   ~Paced() {
     gst_element_set_state(pipeline_, GST_STATE_NULL);
     gst_object_unref(arrivals.sink);
+    gst_object_unref(bus_);
     gst_object_unref(pipeline_);
     gst_object_unref(clock_);
   }
   Paced(const Paced&) = delete;
   Paced& operator=(const Paced&) = delete;
 
+  GstElement* element(const char* name) { return gst_bin_get_by_name(GST_BIN(pipeline_), name); }
+  GstTestClock* clock() { return GST_TEST_CLOCK(clock_); }
+  void play() { gst_element_set_state(pipeline_, GST_STATE_PLAYING); }
+  // Hears what the pipeline says. False: the stream has ended.
+  bool goes_on() {
+    while (GstMessage* message = gst_bus_pop(bus_)) {
+      if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_LATENCY) {
+        gst_bin_recalculate_latency(GST_BIN(pipeline_));
+        arrivals.latency = latency();
+      }
+      const bool error = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
+      EXPECT_FALSE(error);
+      if (error || GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS) ended_ = true;
+      gst_message_unref(message);
+    }
+    return !ended_;
+  }
+  // The time that a thread waits for; none: no thread does.
+  GstClockTime next_wait() {
+    GstClockID waiting = nullptr;
+    if (!gst_test_clock_peek_next_pending_id(clock(), &waiting)) return GST_CLOCK_TIME_NONE;
+    const GstClockTime time = gst_clock_id_get_time(waiting);
+    gst_clock_id_unref(waiting);
+    return time;
+  }
+  void advance() { gst_test_clock_crank(clock()); }
   // Until the stream ends. One thread waits at a time, for a frame's time at the source or at the
   // sink: there is no queue.
   void run() {
-    GstBus* bus = gst_element_get_bus(pipeline_);
-    gst_element_set_state(pipeline_, GST_STATE_PLAYING);
-    auto* clock = GST_TEST_CLOCK(clock_);
-    for (bool going = true; going;) {
-      while (GstMessage* message = gst_bus_pop(bus)) {
-        if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_LATENCY) {
-          gst_bin_recalculate_latency(GST_BIN(pipeline_));
-          arrivals.latency = latency();
-        }
-        const bool error = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
-        EXPECT_FALSE(error);
-        going = going && !error && GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS;
-        gst_message_unref(message);
-      }
-      GstClockID waiting = nullptr;
-      if (going && gst_test_clock_peek_next_pending_id(clock, &waiting)) {
-        gst_clock_id_unref(waiting);
-        gst_test_clock_crank(clock);
-      } else if (going) {
+    while (goes_on())
+      if (GST_CLOCK_TIME_IS_VALID(next_wait()))
+        advance();
+      else
         g_usleep(200);
-      }
-    }
-    gst_object_unref(bus);
   }
 
   Arrivals arrivals;
@@ -114,20 +124,29 @@ class Paced {
 
   GstElement* pipeline_;
   GstClock* clock_;
+  GstBus* bus_;
+  bool ended_ = false;
 };
 
-void expect_in_time(const std::string& element, int told_rate, size_t frames) {
-  SCOPED_TRACE(element + " told of " + std::to_string(told_rate) + " frames per second");
-  Paced paced(element, told_rate, static_cast<int>(frames));
-  paced.run();
-  const Arrivals& arrivals = paced.arrivals;
+// `interval` apart.
+void expect_in_time(const Arrivals& arrivals, size_t frames, GstClockTime interval) {
   ASSERT_EQ(frames, arrivals.came.size());
   for (size_t t = 0; t < frames; ++t) {
     EXPECT_LE(arrivals.came[t], arrivals.due[t]) << t;
     if (t == 0) continue;
     EXPECT_GT(arrivals.pts[t], arrivals.pts[t - 1]) << t;
-    EXPECT_LT(arrivals.came[t] - arrivals.came[t - 1], 3 * kFrame) << t;
+    EXPECT_LT(arrivals.came[t] - arrivals.came[t - 1], 3 * interval) << t;
   }
+}
+
+void expect_in_time(const std::string& element, int told_rate, size_t frames) {
+  SCOPED_TRACE(element + " told of " + std::to_string(told_rate) + " frames per second");
+  Paced paced("videotestsrc is-live=true num-buffers=" + std::to_string(frames) +
+                  " ! video/x-raw,format=RGB,width=64,height=48,framerate=25/1",
+              element, told_rate);
+  paced.play();
+  paced.run();
+  expect_in_time(paced.arrivals, frames, kFrame);
 }
 
 // Across windows, whether they are solved at once or beside the frames that follow, and at the end.
@@ -141,6 +160,133 @@ TEST(PacingByATestClock, EveryFrameIsInTime) {
 TEST(PacingByATestClock, EveryFrameIsInTimeWhateverTheCapsSay) {
   for (int rate : {0, 10, 50})
     expect_in_time("qdmdbackground window-size=20 method=qdmd", rate, 70);
+}
+
+// ---- A camera with few buffers ----
+
+// Counts the frames that the element has done with: its pad's own function, and then one more.
+GstPadChainFunction chain_of_element = nullptr;
+std::atomic<int> frames_done;
+GstFlowReturn chain_and_count(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
+  const GstFlowReturn flow = chain_of_element(pad, parent, buffer);
+  ++frames_done;
+  return flow;
+}
+
+// As v4l2src: a frame for which no buffer is free when its time comes is lost, whatever the
+// streaming thread does meanwhile.
+class Camera {
+ public:
+  Camera(Paced* paced, int buffers, int rate) : paced_(paced), rate_(rate) {
+    gst_video_info_set_format(&info_, GST_VIDEO_FORMAT_RGB, 64, 48);
+    info_.fps_n = rate;
+    info_.fps_d = 1;
+    GstCaps* caps = gst_video_info_to_caps(&info_);
+    source_ = paced->element("camera");
+    g_object_set(source_, "caps", caps, "min-latency", gint64(time_of(1)), "max-latency",
+                 gint64(time_of(buffers)), nullptr);
+    pool_ = gst_buffer_pool_new();
+    GstStructure* config = gst_buffer_pool_get_config(pool_);
+    gst_buffer_pool_config_set_params(config, caps, guint(info_.size), guint(buffers),
+                                      guint(buffers));
+    gst_caps_unref(caps);
+    EXPECT_TRUE(gst_buffer_pool_set_config(pool_, config));
+    EXPECT_TRUE(gst_buffer_pool_set_active(pool_, TRUE));
+    GstElement* tested = paced->element("q");
+    GstPad* pad = gst_element_get_static_pad(tested, "sink");
+    chain_of_element = GST_PAD_CHAINFUNC(pad);
+    frames_done = 0;
+    gst_pad_set_chain_function(pad, chain_and_count);
+    gst_object_unref(pad);
+    gst_object_unref(tested);
+  }
+  ~Camera() {
+    gst_buffer_pool_set_active(pool_, FALSE);
+    gst_object_unref(pool_);
+    gst_object_unref(source_);
+  }
+  Camera(const Camera&) = delete;
+  Camera& operator=(const Camera&) = delete;
+
+  GstClockTime time_of(int t) const {
+    return gst_util_uint64_scale(guint64(t), GST_SECOND, guint64(rate_));
+  }
+  // Returns how many were lost.
+  int film(int frames) {
+    int lost = 0;
+    for (int t = 0; t < frames; ++t) {
+      wait_until(time_of(t));
+      GstBuffer* buffer = nullptr;
+      GstBufferPoolAcquireParams params = {};
+      params.flags = GST_BUFFER_POOL_ACQUIRE_FLAG_DONTWAIT;
+      if (gst_buffer_pool_acquire_buffer(pool_, &buffer, &params) != GST_FLOW_OK) {
+        ++lost;
+        continue;
+      }
+      gst_buffer_memset(buffer, 0, 90, info_.size);
+      gst_buffer_memset(buffer, gsize(t * 31) % (info_.size - 300), 200, 300);
+      GST_BUFFER_PTS(buffer) = time_of(t);
+      GST_BUFFER_DURATION(buffer) = time_of(1);
+      GstFlowReturn flow = GST_FLOW_ERROR;
+      g_signal_emit_by_name(source_, "push-buffer", buffer, &flow);
+      gst_buffer_unref(buffer);
+      EXPECT_EQ(GST_FLOW_OK, flow);
+      ++sent_;
+    }
+    wait_until(time_of(frames));
+    GstFlowReturn flow = GST_FLOW_ERROR;
+    g_signal_emit_by_name(source_, "end-of-stream", &flow);
+    return lost;
+  }
+
+ private:
+  // What can be done until then is done: the streaming thread has no frame left, or waits at the
+  // sink for a later time.
+  void wait_until(GstClockTime time) {
+    while (paced_->goes_on()) {
+      const bool idle = frames_done == sent_;
+      const GstClockTime next = paced_->next_wait();
+      if (GST_CLOCK_TIME_IS_VALID(next) && next <= time)
+        paced_->advance();
+      else if (idle || GST_CLOCK_TIME_IS_VALID(next))
+        break;
+      else
+        g_usleep(50);
+    }
+    gst_test_clock_set_time(paced_->clock(), time);
+  }
+
+  Paced* paced_;
+  int rate_;
+  GstVideoInfo info_;
+  GstElement* source_;
+  GstBufferPool* pool_;
+  int sent_ = 0;
+};
+
+// Sinks wait for as long as they are told, and the camera's thread with them: what the element
+// tells may be longer than what it holds frames for by less than the camera has buffers.
+TEST(PacingByATestClock, ACameraOfFourBuffersLosesNoFrame) {
+  constexpr int kFrames = 250;
+  const auto expect_none_lost = [](const std::string& element, int rate, int told_rate) {
+    SCOPED_TRACE(element + " at " + std::to_string(rate) + " frames per second, told of " +
+                 std::to_string(told_rate));
+    Paced paced("appsrc name=camera is-live=true format=time", element, told_rate);
+    Camera camera(&paced, 4, rate);
+    paced.play();
+    EXPECT_EQ(0, camera.film(kFrames));
+    paced.run();
+    expect_in_time(paced.arrivals, kFrames, camera.time_of(1));
+  };
+  for (const char* element :
+       {"qdmdbackground window-size=100", "qdmdbackground window-size=20",
+        "qdmdbackground window-size=20 n-threads=1", "qdmdbackground window-size=20 method=qdmd",
+        "qdmdbackground mode=live"})
+    // The faster one gives a solve the time of some frames.
+    for (int rate : {30, 2000}) expect_none_lost(element, rate, rate);
+  // Once it is known, latency is that of the frames' own rate.
+  expect_none_lost("qdmdbackground window-size=100", 15, 30);
+  expect_none_lost("qdmdbackground window-size=100", 15, 0);
 }
 
 }  // namespace
