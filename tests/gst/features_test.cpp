@@ -5,49 +5,10 @@
 #include <atomic>
 #include <thread>
 
-#include "tests/gst/element_test.h"
+#include "tests/gst/watched_element.h"
 
 namespace qdmd::test {
 namespace {
-
-// An element of a stream with a bus of its own.
-class Element {
- public:
-  explicit Element(Stream& stream)
-      : element_(gst_harness_find_element(stream.harness(), "qdmdbackground")),
-        bus_(gst_bus_new()) {
-    gst_element_set_bus(element_, bus_);
-  }
-  ~Element() {
-    gst_element_set_bus(element_, nullptr);
-    gst_object_unref(bus_);
-    gst_object_unref(element_);
-  }
-  Element(const Element&) = delete;
-  Element& operator=(const Element&) = delete;
-
-  GstElement* get() const { return element_; }
-  template <typename... Values>
-  void set(const char* name, Values... values) {
-    g_object_set(element_, name, values..., nullptr);
-  }
-  // The solves' messages since the last call.
-  std::vector<GstMessage*> messages() {
-    std::vector<GstMessage*> all;
-    while (GstMessage* message = gst_bus_pop_filtered(bus_, GST_MESSAGE_ELEMENT))
-      all.push_back(message);
-    return all;
-  }
-  GstSample* background() const {
-    GstSample* sample = nullptr;
-    g_object_get(element_, "background", &sample, nullptr);
-    return sample;
-  }
-
- private:
-  GstElement* element_;
-  GstBus* bus_;
-};
 
 // ---- Messages ----
 

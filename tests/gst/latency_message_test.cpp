@@ -3,39 +3,25 @@
 
 #include <utility>
 
-#include "tests/gst/element_test.h"
+#include "tests/gst/watched_element.h"
 
 namespace qdmd::test {
 namespace {
 
-int latency_messages(GstBus* bus) {
-  int count = 0;
-  while (GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_LATENCY)) {
-    ++count;
-    gst_message_unref(message);
-  }
-  return count;
-}
-
 TEST(LatencyMessage, IsPostedOnceForEachChange) {
   Stream stream("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24);
-  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
-  GstBus* bus = gst_bus_new();
-  gst_element_set_bus(element, bus);
+  Element element(stream);
   stream.push_many(0, 8);
-  EXPECT_EQ(0, latency_messages(bus)) << "it was posted with the first caps";
+  EXPECT_EQ(0, element.latency_messages()) << "it was posted with the first caps";
   stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16);
   stream.push_many(8, 8);
-  EXPECT_EQ(0, latency_messages(bus)) << "the rate is the same";
+  EXPECT_EQ(0, element.latency_messages()) << "the rate is the same";
   stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16, 50);
-  EXPECT_EQ(1, latency_messages(bus));
+  EXPECT_EQ(1, element.latency_messages());
   EXPECT_EQ(7 * GST_SECOND / 50, gst_harness_query_latency(stream.harness()));
   stream.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16, 0);
-  EXPECT_EQ(1, latency_messages(bus));
+  EXPECT_EQ(1, element.latency_messages());
   EXPECT_EQ(7 * GST_SECOND / 25, gst_harness_query_latency(stream.harness()));
-  gst_element_set_bus(element, nullptr);
-  gst_object_unref(bus);
-  gst_object_unref(element);
 }
 
 // Frames of 10 a second, whatever the caps say.
@@ -43,29 +29,24 @@ TEST(LatencyMessage, IsPostedWhereFramesComeMoreSlowlyThanTheCapsSay) {
   constexpr GstClockTime kInterval = GST_SECOND / 10;
   for (int rate : {0, 25}) {
     Stream stream("qdmdbackground window-size=8", GST_VIDEO_FORMAT_RGB, 40, 24, rate);
-    GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
-    GstBus* bus = gst_bus_new();
-    gst_element_set_bus(element, bus);
+    Element element(stream);
     for (int t = 0; t < 40; ++t) {
       auto buffer = stream.make_frame(t, paint_mover);
       GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(t) * kInterval;
       GST_BUFFER_DURATION(buffer.get()) = kInterval;
       ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer.release()));
       if (t < 7) {
-        EXPECT_EQ(0, latency_messages(bus)) << t;
+        EXPECT_EQ(0, element.latency_messages()) << t;
         EXPECT_EQ(7 * kFrame, gst_harness_query_latency(stream.harness())) << t;
       } else {
         // The first has left.
         if (t == 7) {
-          EXPECT_GE(latency_messages(bus), 1);
+          EXPECT_GE(element.latency_messages(), 1);
         }
         EXPECT_GE(gst_harness_query_latency(stream.harness()), 7 * kInterval) << t;
       }
     }
     EXPECT_EQ(33u, stream.take_all().size());
-    gst_element_set_bus(element, nullptr);
-    gst_object_unref(bus);
-    gst_object_unref(element);
   }
 }
 

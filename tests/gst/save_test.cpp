@@ -5,7 +5,7 @@
 #include <atomic>
 #include <thread>
 
-#include "tests/gst/element_test.h"
+#include "tests/gst/watched_element.h"
 
 namespace qdmd::test {
 namespace {
@@ -47,69 +47,6 @@ void write(const std::string& file, const Bytes& bytes) {
                                   static_cast<gssize>(bytes.size()), nullptr));
 }
 
-bool call(GstElement* element, const char* signal, const char* file) {
-  gboolean done = FALSE;
-  g_signal_emit_by_name(element, signal, file, &done);
-  return done;
-}
-
-// An element of a stream with a bus of its own.
-class Element {
- public:
-  explicit Element(Stream& stream)
-      : element_(gst_harness_find_element(stream.harness(), "qdmdbackground")),
-        bus_(gst_bus_new()) {
-    gst_element_set_bus(element_, bus_);
-  }
-  ~Element() {
-    gst_element_set_bus(element_, nullptr);
-    gst_object_unref(bus_);
-    gst_object_unref(element_);
-  }
-  Element(const Element&) = delete;
-  Element& operator=(const Element&) = delete;
-
-  GstElement* get() const { return element_; }
-  bool save(const std::string& file) { return call(element_, "save", file.c_str()); }
-  bool load(const std::string& file) { return call(element_, "load", file.c_str()); }
-  // Of the warning that was posted since the last call; empty where there was none.
-  std::string warning() {
-    std::string text;
-    while (GstMessage* message = gst_bus_pop_filtered(bus_, GST_MESSAGE_WARNING)) {
-      GError* error = nullptr;
-      gst_message_parse_warning(message, &error, nullptr);
-      text += error->message;
-      g_error_free(error);
-      gst_message_unref(message);
-    }
-    return text;
-  }
-  guint64 solves() const {
-    GstStructure* stats = nullptr;
-    g_object_get(element_, "stats", &stats, nullptr);
-    guint64 solves = 0;
-    gst_structure_get_uint64(stats, "solves", &solves);
-    gst_structure_free(stats);
-    return solves;
-  }
-  // Empty where there is none.
-  Bytes background() const {
-    GstSample* sample = nullptr;
-    g_object_get(element_, "background", &sample, nullptr);
-    if (!sample) return {};
-    GstMapInfo map;
-    EXPECT_TRUE(gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ));
-    const Bytes bytes(map.data, map.data + map.size);
-    gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
-    gst_sample_unref(sample);
-    return bytes;
-  }
-
- private:
-  GstElement* element_;
-  GstBus* bus_;
-};
-
 Bytes bytes_of(GstBuffer* buffer) {
   Bytes bytes(gst_buffer_get_size(buffer));
   gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
@@ -126,7 +63,7 @@ Bytes save_one(const std::string& file, const std::string& launch = "mode=live",
   stream.push_many(0, 40);
   EXPECT_TRUE(element.save(file)) << element.warning();
   EXPECT_EQ("", element.warning());
-  return element.background();
+  return element.background_bytes();
 }
 
 void expect_contains(const std::string& text, const std::string& part) {
@@ -142,9 +79,9 @@ TEST(Save, LoadedAndSavedIsTheSameFile) {
     Stream stream(std::string("qdmdbackground window-size=16 ") + launch, GST_VIDEO_FORMAT_RGB,
                   kWidth, kHeight);
     Element element(stream);
-    EXPECT_TRUE(element.background().empty());
+    EXPECT_TRUE(element.background_bytes().empty());
     ASSERT_TRUE(element.load(folder.file())) << element.warning();
-    EXPECT_EQ(background, element.background()) << launch;
+    EXPECT_EQ(background, element.background_bytes()) << launch;
     ASSERT_TRUE(element.save(folder.file("again.qdmd"))) << element.warning();
     EXPECT_EQ(read(folder.file()), read(folder.file("again.qdmd"))) << launch;
     EXPECT_EQ(0u, element.solves());
@@ -190,7 +127,7 @@ TEST(Save, FrozenBatchComparesWithItAndSolvesNothing) {
   Stream stream("qdmdbackground window-size=8 freeze=true load-location=" + folder.file(),
                 GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);
-  EXPECT_EQ(background, element.background());
+  EXPECT_EQ(background, element.background_bytes());
   stream.push_many(0, 21);
   ASSERT_TRUE(stream.eos());
   const auto out = stream.take_all();
@@ -243,7 +180,7 @@ TEST(Save, FormatsOfOneFamilyExchangeFiles) {
     Stream second("qdmdbackground window-size=4", to, kWidth, kHeight);
     Element loader(second);
     EXPECT_EQ(fits, loader.load(folder.file()));
-    EXPECT_EQ(fits, !loader.background().empty());
+    EXPECT_EQ(fits, !loader.background_bytes().empty());
     const std::string warning = loader.warning();
     EXPECT_EQ(fits, warning.empty()) << warning;
     if (fits) continue;
@@ -348,7 +285,7 @@ TEST(SaveErrors, AFileThatCannotBeLoadedChangesNothing) {
   Stream stream("qdmdbackground window-size=16 mode=live", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);
   stream.push_many(0, 30, paint_still);
-  const Bytes background = element.background();
+  const Bytes background = element.background_bytes();
   const std::pair<const char*, const char*> cases[] = {
       {"damaged", "checksum"},
       {"newer", "version 2"},
@@ -365,7 +302,7 @@ TEST(SaveErrors, AFileThatCannotBeLoadedChangesNothing) {
     const std::string warning = element.warning();
     expect_contains(warning, "Cannot load the background of \"" + folder.file(name) + "\": ");
     expect_contains(warning, what);
-    EXPECT_EQ(background, element.background()) << name;
+    EXPECT_EQ(background, element.background_bytes()) << name;
   }
   EXPECT_FALSE(element.load("/dev/zero"));
   expect_contains(element.warning(), "not a regular file");
