@@ -13,13 +13,16 @@ int Workers::count(int threads) {
 }
 
 Workers::Workers(int threads)
-    : threads_(threads), asked_(threads), pool_(count(threads)), side_(count(threads) > 1) {}
+    : threads_(threads), asked_(threads), pool_(count(threads)), side_(may_work_beside(threads)) {}
 
 void Workers::follow() {
   if (asked_ == threads_ || !side_.idle()) return;
   threads_ = asked_;
   pool_.resize(count(threads_));
-  side_.set_active(count(threads_) > 1);
+  side_.set_active(may_work_beside(threads_));
 }
+
+// A core that all threads share goes from one to the other: frames pass while a solve goes on.
+bool Workers::may_work_beside(int threads) { return threads != 1; }
 
 }  // namespace qdmd

@@ -6,8 +6,8 @@
 
 namespace qdmd {
 
-// A pool for passes over pixels and, where there is more than one thread, one for what goes on
-// beside the caller.
+// A pool for passes over pixels and, unless it is to be one thread, one for what goes on beside the
+// caller.
 class Workers {
  public:
   static constexpr int kMost = 256;
@@ -15,7 +15,8 @@ class Workers {
   // The threads that Workers(threads) asks the system for.
   static int count(int threads);
 
-  // `threads` <= kMost; 0: one for each core. Fewer where the system starts no more.
+  // `threads` <= kMost; 0: one for each core, and what goes on beside the caller has its own even
+  // on one core. Fewer where the system starts no more.
   explicit Workers(int threads);
 
   Pool& pool() { return pool_; }
@@ -27,6 +28,8 @@ class Workers {
   void follow();
 
  private:
+  static bool may_work_beside(int threads);
+
   int threads_, asked_;
   Pool pool_;
   // The last member: it ends before the pool, which it may use.

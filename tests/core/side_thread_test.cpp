@@ -8,7 +8,10 @@
 #include <future>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
+
+#include "core/parallel/workers.h"
 
 namespace qdmd::test {
 namespace {
@@ -157,6 +160,26 @@ TEST(SideThread, IsSwitchedOnAndOff) {
     side.start([&] { worker = std::this_thread::get_id(); });
     side.finish();
     EXPECT_EQ(active, worker != std::this_thread::get_id());
+  }
+}
+
+// Whatever the number of cores is.
+TEST(SideThread, IsOneOfItsOwnUnlessThereIsToBeOneThread) {
+  for (int threads : {0, 1, 2}) {
+    Workers workers(threads);
+    const auto expect_beside = [&](bool beside) {
+      std::thread::id id;
+      workers.side().start([&id] { id = std::this_thread::get_id(); });
+      workers.side().finish();
+      EXPECT_EQ(id != std::this_thread::get_id(), beside) << threads;
+    };
+    expect_beside(threads != 1);
+    workers.ask_for(1);
+    workers.follow();
+    expect_beside(false);
+    workers.ask_for(0);
+    workers.follow();
+    expect_beside(true);
   }
 }
 
