@@ -51,10 +51,14 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   for (int t = 0; t < snapshots.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
   const auto pictures = static_cast<size_t>(basis_.rows());
-  // Room for more pictures is made without the old ones beside it.
-  if (samples_.capacity() < pictures * pixels_) std::vector<float>().swap(samples_);
   direct_ =
       !keep_pictures && may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
+  // Of what freeze_at() makes of them, too. Room for more is made without the old ones beside it.
+  const size_t room = direct_ ? 0 : std::max<size_t>(pictures, kChannels) * pixels_;
+  if (samples_.capacity() < room) {
+    std::vector<float>().swap(samples_);
+    samples_.reserve(room);
+  }
   make_pictures(direct_ ? 0 : pictures);
   if (!direct_) group_by_four(basis_, &coefficients_);
 }

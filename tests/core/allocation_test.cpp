@@ -180,5 +180,25 @@ TEST_F(Allocations, FlushAndDrainOfNothing) {
   }
 }
 
+// What is frozen has three pictures, however few the model has: max-memory counts no more than
+// that, and none of them twice.
+TEST_F(Allocations, FreezingAModelTakesNoPicture) {
+  constexpr size_t kPixels = 5000;
+  std::mt19937 rng(365);
+  const Clip clip = random_clip(kPixels, 4, rng);
+  const Window window = to_window(clip);
+  for (int modes : {0, 1, 2, 3}) {
+    TemporalModel temporal(4);
+    for (int c = 0; c < modes; ++c)
+      temporal.add_channel_mode(c, Eigen::VectorXcd::Constant(4, 0.25), 1.0, 0, 1.0);
+    BackgroundModel model;
+    model.build(window, temporal);
+    allocator::start();
+    model.freeze_at(2);
+    allocator::stop();
+    EXPECT_LT(allocator::seen().peak, int64_t{kPixels}) << modes << " pictures";
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test
