@@ -3,6 +3,14 @@
 #include <algorithm>
 
 namespace qdmd {
+namespace {
+
+// Of `theirs` parts of a length, the one that the middle of part k of `ours` lies in.
+int middle_in(int k, int ours, int theirs) {
+  return static_cast<int>((2 * int64_t{k} + 1) * theirs / (2 * int64_t{ours}));
+}
+
+}  // namespace
 
 LitPicture Earlier::picture(const Gain& gain) const {
   return {{level_[0].data(), level_[1].data(), level_[2].data()}, gain};
@@ -47,15 +55,23 @@ void Earlier::read(const Grid& grid, const Learnt::Earlier& from) {
   // Memory first, and the old content stays until all of it is there.
   for (size_t c = 0; c < kChannels; ++c) level_[c].reserve(from.level[c].size());
   spread_.reserve(from.spread.size());
-  weight_.reserve(from.weight.size());
-  limit_.reserve(from.limit.size());
+  weight_.reserve(grid.cells());
+  limit_.reserve(grid.cells());
   for (size_t c = 0; c < kChannels; ++c) {
     level_[c] = from.level[c];
     cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
   }
   spread_ = from.spread;
-  weight_ = from.weight;
-  limit_ = from.limit;
+  weight_.resize(grid.cells());
+  limit_.resize(grid.cells());
+  for (int row = 0; row < grid.rows; ++row)
+    for (int col = 0; col < grid.cols; ++col) {
+      const auto cell = static_cast<size_t>(row * grid.cols + col);
+      const auto its = static_cast<size_t>(middle_in(row, grid.rows, from.rows) * from.cols +
+                                           middle_in(col, grid.cols, from.cols));
+      weight_[cell] = from.weight[its];
+      limit_[cell] = from.limit[its];
+    }
   known_ = true;
 }
 

@@ -33,7 +33,8 @@ class Earlier {
   void take(const Grid& grid, const Reference& background, const std::vector<uint8_t>& spread,
             const StableFrames& stable, int count, float fresh);
 
-  // What is known, for a file and back. Where read() throws, all is as it was.
+  // What is known, for a file and back; its grid may be another, and each cell then knows what the
+  // one at its middle did. Where read() throws, all is as it was.
   void write(const Grid& grid, Learnt::Earlier* out) const;
   void read(const Grid& grid, const Learnt::Earlier& from);
 

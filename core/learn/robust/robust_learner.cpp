@@ -115,7 +115,7 @@ void RobustLearner::remember(Learnt* learnt) const {
 
 void RobustLearner::recall(const Learnt& learnt) {
   if (parameters_.earlier_share <= 0) return;
-  if (learnt.earlier && learnt.earlier->rows == grid_.rows && learnt.earlier->cols == grid_.cols)
+  if (learnt.earlier)
     earlier_.read(grid_, *learnt.earlier);
   else
     earlier_.forget();
