@@ -116,9 +116,13 @@ void BatchSchedule::advance() {
   if (next.state == State::learnt) {
     wait();
     background().publish();
+  } else if (loaded_ && next.begin >= loaded_->from) {
+    wait();
+    background().show(loaded_->learnt, next.state);
   } else {
     background().hold(background().report().window_frames - 1, next.state);
   }
+  if (loaded_ && next.begin >= loaded_->from) loaded_.reset();
   shown_ = next;
   waiting_.reset();
   if (!collection_) return;
@@ -145,6 +149,7 @@ void BatchSchedule::restart() {
   frames().clear();
   waiting_.reset();
   collection_.reset();
+  loaded_.reset();
   break_ = false;
   history_from_ = taken();
   shown_ = {taken(), taken(), taken()};
@@ -153,9 +158,16 @@ void BatchSchedule::restart() {
 // Frames that wait have their background, or their window is about to be solved.
 void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
   const bool shown = !background().known() || queue.pending == 0;
+  std::optional<Loaded> loaded;
   if (shown) background().make_room();
+  if (queue.pending > 0) {
+    loaded = Loaded{learnt, taken()};
+    // Others are told of that.
+    loaded->learnt.earlier.reset();
+  }
   background().recall(learnt);
   if (shown) background().show(learnt, State::held);
+  loaded_ = std::move(loaded);
 }
 
 void BatchSchedule::show(int index) {

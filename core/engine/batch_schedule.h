@@ -43,6 +43,11 @@ class BatchSchedule : public Schedule {
     Background::State state = Background::State::learnt;
     int not_added = 0;  // newest frames whose inner products are not computed yet
   };
+  // Shown by the first window from frame `from` on, if that one is held.
+  struct Loaded {
+    Learnt learnt;
+    int64_t from;
+  };
   // The side thread's.
   struct Work {
     SnapshotRange span;
@@ -69,6 +74,7 @@ class BatchSchedule : public Schedule {
   Stretch shown_;             // with the background in use
   std::optional<Stretch> waiting_;
   std::optional<Collection> collection_;
+  std::optional<Loaded> loaded_;
   std::optional<Work> work_;
 };
 

@@ -53,8 +53,9 @@ class Engine {
   // Goes on with what an earlier run learnt: the background is held until there is a model of this
   // one's frames, as after drain(), and method=robust is told of it as of a window before. Live: at
   // once, and the next frame begins a new window. Batch: windows that end from now on are told; the
-  // picture is used where there is no background yet, or no frame waits. Not ok where the size is
-  // another; all is then as it was. Waits, and throws, as learnt() does.
+  // picture is used where there is no background yet, or no frame waits, or by the next window that
+  // begins, if it is held. Not ok where the size is another; all is then as it was. Waits, and
+  // throws, as learnt() does.
   Status learn_from(const Learnt& learnt);
   // What learn_from() would say.
   Status may_learn_from(const Learnt& learnt) const;

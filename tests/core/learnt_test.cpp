@@ -2,6 +2,8 @@
 #include "core/model/learnt_file.h"
 
 #include <cstdlib>
+#include <iterator>
+#include <utility>
 
 #include "core/passes/grid.h"
 #include "tests/core/live_util.h"
@@ -90,31 +92,31 @@ double mean_distance(const std::vector<uint8_t>& a, const std::vector<uint8_t>& 
   return sum / static_cast<double>(a.size());
 }
 
-// Of video of 5x3.
-Learnt small() {
+// One level.
+Learnt plain(int width, int height) {
   Learnt learnt;
-  learnt.width = 5;
-  learnt.height = 3;
-  for (auto& level : learnt.level) level.assign(15, 77);
+  learnt.width = width;
+  learnt.height = height;
+  for (auto& level : learnt.level) level.assign(static_cast<size_t>(width * height), 77);
   return learnt;
 }
 
 TEST(Learnt, NothingIsKnownBeforeTheFirstSolve) {
-  Learnt learnt = small();
+  Learnt learnt = plain(5, 3);
   Engine none;
   EXPECT_FALSE(none.learnt(&learnt));
   EXPECT_EQ(Status::Code::not_configured, none.learn_from(learnt).code);
   Box box(kWidth, kHeight, options_of(Mode::batch, Method::robust));
   for (int t = 0; t < 20; ++t) box.push(walking(t));
   EXPECT_FALSE(box.engine.learnt(&learnt));
-  EXPECT_EQ(pack(learnt), pack(small()));
+  EXPECT_EQ(pack(learnt), pack(plain(5, 3)));
 }
 
 TEST(Learnt, AnotherSizeIsRefusedAndChangesNothing) {
   Box box(kWidth, kHeight, options_of(Mode::live, Method::robust));
   for (int t = 0; t < 40; ++t) box.push(walking(t));
   const auto before = pack(box.learnt());
-  const Status status = box.engine.learn_from(small());
+  const Status status = box.engine.learn_from(plain(5, 3));
   EXPECT_EQ(Status::Code::invalid_options, status.code);
   EXPECT_NE(std::string::npos, status.message.find("5x3")) << status.message;
   EXPECT_NE(std::string::npos, status.message.find("64x48")) << status.message;
@@ -287,6 +289,51 @@ TEST(Learnt, FrozenFromTheStartNothingIsSolved) {
       for (int t = 0; t < 70; ++t) box.push(walking(t));
       EXPECT_GT(box.engine.solves(), 0u);
     }
+}
+
+// Windows that had begun by then keep the background that they have.
+TEST(Learnt, WhileABatchIsFrozenTheNextWindowHasIt) {
+  for (double rate : {0.0, 1e9})
+    for (int at : {5, 29, 30, 31, 44, 59, 60, 61}) {
+      SCOPED_TRACE(std::to_string(at) + " frames, then the load, at " + std::to_string(rate));
+      auto options = options_of(Mode::batch, Method::robust);
+      const Learnt learnt = plain(kWidth, kHeight);
+      options.frame_rate = rate;
+      Box box(kWidth, kHeight, options);
+      std::vector<std::vector<uint8_t>> pictures;
+      const auto see = [&](std::vector<std::vector<uint8_t>> more) {
+        std::move(more.begin(), more.end(), std::back_inserter(pictures));
+      };
+      for (int t = 0; t < 130; ++t) {
+        if (t == 30) box.engine.set_freeze(true);
+        if (t == at) {
+          ASSERT_TRUE(box.engine.learn_from(learnt).ok());
+        }
+        see(box.push(walking(t)));
+      }
+      ASSERT_TRUE(box.engine.drain().ok());
+      see(box.pop());
+      ASSERT_EQ(130u, pictures.size());
+      const int from = (at + 29) / 30 * 30;
+      for (int t = 30; t < 130; ++t)
+        ASSERT_EQ(t >= from, pictures[static_cast<size_t>(t)] == planes_of(learnt)) << t;
+      EXPECT_EQ(1u, box.engine.solves());
+    }
+}
+
+// The same without a freeze: it is told to windows, and none shows it, now or later.
+TEST(Learnt, WhileABatchIsSolvedNoWindowShowsIt) {
+  auto options = options_of(Mode::batch, Method::qdmd);
+  options.frame_rate = 1e9;
+  const Learnt learnt = plain(kWidth, kHeight);
+  Box box(kWidth, kHeight, options);
+  for (int t = 0; t < 250; ++t) {
+    if (t == 44) {
+      ASSERT_TRUE(box.engine.learn_from(learnt).ok());
+    }
+    if (t == 90) box.engine.set_freeze(true);
+    for (const auto& picture : box.push(walking(t))) ASSERT_NE(planes_of(learnt), picture) << t;
+  }
 }
 
 TEST(Learnt, WhileABatchWaitsEveryFrameLeaves) {
