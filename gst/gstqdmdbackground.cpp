@@ -232,10 +232,8 @@ static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirecti
   GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
   gst_query_parse_latency(query, &live, &min, &max);
   GST_OBJECT_LOCK(self);
-  const GstClockTime own = self->state->latency.promised();
+  self->state->latency.add_to(live, &min, &max);
   GST_OBJECT_UNLOCK(self);
-  min += own;
-  if (GST_CLOCK_TIME_IS_VALID(max)) max += own;
   gst_query_set_latency(query, live, min, max);
   return TRUE;
 }

@@ -65,4 +65,16 @@ bool Latency::frame_out(GstClockTime timestamp, GstClockTime held) {
   return waited + held > promised_ + kInHand && promise(waited + held + held / 4);
 }
 
+// What sinks wait for beyond the frames that wait here holds upstream up: a camera that can keep
+// less of it than that loses frames all the time, and not only while a solve takes too long.
+void Latency::add_to(bool live, GstClockTime* min, GstClockTime* max) const {
+  const GstClockTime frames = std::min(frames_time_, promised_);
+  GstClockTime more = promised_ - frames;
+  if (GST_CLOCK_TIME_IS_VALID(*max)) {
+    if (live) more = std::min(more, *max > *min ? *max - *min : 0);
+    *max += frames;
+  }
+  *min += frames + more;
+}
+
 }  // namespace qdmd

@@ -22,6 +22,9 @@ class Latency {
     first_ = newest_ = GST_CLOCK_TIME_NONE;
   }
   GstClockTime promised() const { return promised_; }
+  // To a LATENCY query whose answer from upstream is `min` to `max` (GST_CLOCK_TIME_NONE: any), the
+  // answer to downstream.
+  void add_to(bool live, GstClockTime* min, GstClockTime* max) const;
 
   // Each returns true where the promise grew: a LATENCY message is due.
   // A frame came, after the one before in time.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <utility>
 
 namespace qdmd::test {
 namespace {
@@ -168,6 +169,31 @@ TEST(Latency, OfASolveThatHeldUpAFrameWithWhichNoneLeaves) {
   EXPECT_TRUE(latency.held_up(500 * GST_MSECOND));
   EXPECT_GE(latency.promised(), 24 * GST_SECOND / 10 + 500 * GST_MSECOND);
   EXPECT_LE(latency.promised(), 25 * GST_SECOND / 10 + 650 * GST_MSECOND);
+}
+
+// Upstream keeps frames while sinks wait for a solve, as many as it can.
+TEST(Latency, OfWhatHoldsFramesUpIsNoMoreThanUpstreamKeeps) {
+  Latency latency;
+  latency.configure(24, 25, 1);
+  const GstClockTime waited = 24 * GST_SECOND / 25;
+  const auto answer = [&](bool live, GstClockTime min, GstClockTime max) {
+    latency.add_to(live, &min, &max);
+    return std::pair(min, max);
+  };
+  constexpr GstClockTime kAny = GST_CLOCK_TIME_NONE, kFrame = GST_SECOND / 25;
+  EXPECT_EQ(answer(true, kFrame, 4 * kFrame), std::pair(kFrame + waited, 4 * kFrame + waited));
+  EXPECT_EQ(answer(true, kFrame, kAny), std::pair(kFrame + waited, kAny));
+  latency.held_up(GST_SECOND);
+  const GstClockTime promised = latency.promised();
+  EXPECT_GT(promised, waited + GST_SECOND);
+  EXPECT_EQ(answer(true, kFrame, kAny), std::pair(kFrame + promised, kAny));
+  EXPECT_EQ(answer(true, kFrame, 4 * kFrame), std::pair(4 * kFrame + waited, 4 * kFrame + waited));
+  EXPECT_EQ(answer(true, kFrame, kFrame), std::pair(kFrame + waited, kFrame + waited));
+  EXPECT_EQ(answer(true, kFrame, 0), std::pair(kFrame + waited, waited));
+  EXPECT_EQ(answer(true, kFrame, 4 * GST_SECOND),
+            std::pair(kFrame + promised, 4 * GST_SECOND + waited));
+  // Files wait.
+  EXPECT_EQ(answer(false, 0, kFrame), std::pair(promised, kFrame + waited));
 }
 
 TEST(Latency, OfLiveIsNone) {

@@ -1,6 +1,7 @@
 // A live pipeline whose time a test advances: every frame is at the sink when it was promised, and
 // no wall clock says so.
 #include <gst/check/gsttestclock.h>
+#include <gst/video/gstvideometa.h>
 
 #include <atomic>
 
@@ -173,6 +174,25 @@ GstFlowReturn chain_and_count(GstPad* pad, GstObject* parent, GstBuffer* buffer)
   return flow;
 }
 
+// The element's clock goes on while it reads the frame.
+constexpr GstClockTime kSlow = 400 * GST_MSECOND;
+GstClock* clock_of_slow_frame = nullptr;
+gboolean map_slowly(GstVideoMeta* meta, guint plane, GstMapInfo* info, gpointer* data, gint* stride,
+                    GstMapFlags flags) {
+  GstClockID id = gst_clock_new_single_shot_id(clock_of_slow_frame,
+                                               gst_clock_get_time(clock_of_slow_frame) + kSlow);
+  gst_clock_id_wait(id, nullptr);
+  gst_clock_id_unref(id);
+  if (!gst_buffer_map(meta->buffer, info, flags)) return FALSE;
+  *data = info->data + meta->offset[plane];
+  *stride = meta->stride[plane];
+  return TRUE;
+}
+gboolean unmap(GstVideoMeta* meta, guint, GstMapInfo* info) {
+  gst_buffer_unmap(meta->buffer, info);
+  return TRUE;
+}
+
 // As v4l2src: a frame for which no buffer is free when its time comes is lost, whatever the
 // streaming thread does meanwhile.
 class Camera {
@@ -211,8 +231,8 @@ class Camera {
   GstClockTime time_of(int t) const {
     return gst_util_uint64_scale(guint64(t), GST_SECOND, guint64(rate_));
   }
-  // Returns how many were lost.
-  int film(int frames) {
+  // Returns how many were lost. Reading frame `slow` takes the element long.
+  int film(int frames, int slow = -1) {
     int lost = 0;
     for (int t = 0; t < frames; ++t) {
       wait_until(time_of(t));
@@ -225,6 +245,14 @@ class Camera {
       }
       gst_buffer_memset(buffer, 0, 90, info_.size);
       gst_buffer_memset(buffer, gsize(t * 31) % (info_.size - 300), 200, 300);
+      if (t == slow) {
+        GstVideoMeta* meta =
+            gst_buffer_add_video_meta(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_RGB,
+                                      guint(info_.width), guint(info_.height));
+        meta->map = map_slowly;
+        meta->unmap = unmap;
+        clock_of_slow_frame = GST_CLOCK(paced_->clock());
+      }
       GST_BUFFER_PTS(buffer) = time_of(t);
       GST_BUFFER_DURATION(buffer) = time_of(1);
       GstFlowReturn flow = GST_FLOW_ERROR;
@@ -287,6 +315,25 @@ TEST(PacingByATestClock, ACameraOfFourBuffersLosesNoFrame) {
   // Once it is known, latency is that of the frames' own rate.
   expect_none_lost("qdmdbackground window-size=100", 15, 30);
   expect_none_lost("qdmdbackground window-size=100", 15, 0);
+}
+
+// A solve that holds the stream up for longer than the camera has buffers costs the frames of that
+// time, and none after it: what sinks wait for is no more than what the camera keeps.
+TEST(PacingByATestClock, ASolveThatTakesTooLongCostsNoFramesLater) {
+  constexpr int kRate = 30, kWindow = 20, kFrames = 300;
+  constexpr int kFramesOfSlow = int(kSlow * kRate / GST_SECOND);
+  for (int slow : {kWindow - 1, 2 * kWindow - 1}) {
+    SCOPED_TRACE("frame " + std::to_string(slow));
+    Paced paced("appsrc name=camera is-live=true format=time",
+                "qdmdbackground n-threads=1 window-size=" + std::to_string(kWindow), kRate);
+    Camera camera(&paced, 4, kRate);
+    paced.play();
+    const int lost = camera.film(kFrames, slow);
+    EXPECT_GT(lost, 0);
+    EXPECT_LE(lost, kFramesOfSlow);
+    paced.run();
+    EXPECT_EQ(size_t(kFrames - lost), paced.arrivals.came.size());
+  }
 }
 
 }  // namespace
