@@ -70,7 +70,11 @@ size_t level_vectors(const float* weights, const float* const* pictures, size_t 
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
     auto r = half, g = half, b = half;
     for (size_t k = 0; k < picture_count; ++k) {
-      const auto level = hn::LoadU(d, pictures[k] + first + p);
+      const float* from = pictures[k] + first + p;
+      // The next run's: other frames' work has driven it out of the cache, and the hardware
+      // foresees nothing beyond a page.
+      hwy::Prefetch(from + kMaxRun);
+      const auto level = hn::LoadU(d, from);
       r = hn::MulAdd(hn::Set(d, red[k]), level, r);
       g = hn::MulAdd(hn::Set(d, green[k]), level, g);
       b = hn::MulAdd(hn::Set(d, blue[k]), level, b);
