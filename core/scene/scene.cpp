@@ -121,6 +121,10 @@ void Scene::paint_objects() {
     state_.coverage.resize(state_.world.width, state_.world.height);
     state_.coverage.fill(0);
   }
+  if (!stages_.ground.empty()) {
+    state_.shadow.resize(state_.world.width, state_.world.height);
+    state_.shadow.fill(0);
+  }
   for (Effect* effect : stages_.ground) effect->ground(state_, placements_);
   for (const Placement& placement : placements_) {
     if (placement.part_of_background) continue;
