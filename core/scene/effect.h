@@ -56,6 +56,7 @@ struct FrameState {
   int width = 0, height = 0, margin = 0;  // pixels of the frame, and around it
 
   Picture world;                    // the background of this frame
+  Sprite front;                     // what of it is nearer than any object; no runs: nothing
   Picture picture, truth;           // with objects, without
   Plane coverage;                   // 255 where an object covers the whole pixel
   Plane shadow;                     // 255 where an object changes the ground
