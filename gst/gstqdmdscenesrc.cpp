@@ -7,7 +7,8 @@
  * properties name: noise, a shaking camera, changing light, waving leaves, bags that are left. With
  * #GstQdmdSceneSrc:truth it sends what is true of the same frames instead: the background as the
  * camera would see it without anybody (before weather, noise and compression), or the mask of what
- * does not belong to it. Sources of one seed, one scene and one frame rate are in step.
+ * does not belong to it, with shadows and edges marked apart as `labels`. Sources of one seed, one
+ * scene and one frame rate are in step.
  *
  * A frame follows from its number, the seed and the scene alone: seeking to it gives what playing
  * up to it gives. Effects that are not named cost nothing.
@@ -54,7 +55,7 @@ using namespace qdmd::scene;
 
 constexpr gint kWidth = 320, kHeight = 240, kRate = 25;
 
-enum Truth { TRUTH_NONE, TRUTH_BACKGROUND, TRUTH_MASK };
+enum Truth { TRUTH_NONE, TRUTH_BACKGROUND, TRUTH_MASK, TRUTH_LABELS };
 
 struct Settings {
   std::string scene = "default", effects;
@@ -103,6 +104,11 @@ static GType gst_qdmd_scene_src_truth_get_type() {
        "White where an object covers at least half of the pixel, else black; shadows "
        "are black",
        "mask"},
+      {TRUTH_LABELS,
+       "CDnet's grey levels: 0 background, 50 shadow or mirror image, 170 an object covers less "
+       "than "
+       "half of the pixel, 255 object",
+       "labels"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdSceneSrcTruth", values);
   return type;
@@ -231,6 +237,10 @@ static GstFlowReturn gst_qdmd_scene_src_fill(GstPushSrc* source, GstBuffer* buff
         case TRUTH_MASK:
           priv->scene->render(priv->index, kLabels);
           qdmd::write_mask(priv->scene->labels(), view);
+          break;
+        case TRUTH_LABELS:
+          priv->scene->render(priv->index, kLabels);
+          qdmd::write_labels(priv->scene->labels(), view);
           break;
       }
     });

@@ -38,19 +38,30 @@ inline void write_picture(const scene::Picture& picture, const MutableImageView&
   clear_padding(view);
 }
 
-// White where the label is that of an object, else black.
-inline void write_mask(const scene::Plane& labels, const MutableImageView& view) {
+// Grey of a level that follows from the label.
+template <typename LevelOf>
+void write_grey(const scene::Plane& labels, const MutableImageView& view, LevelOf level_of) {
   for (int y = 0; y < view.height; ++y) {
     const uint8_t* from = labels.row(y);
     const ptrdiff_t row = y * view.row_stride;
     for (int x = 0; x < view.width; ++x) {
       const ptrdiff_t at = row + x * view.pixel_stride;
-      const uint8_t level = from[x] == scene::kObjectLabel ? 255 : 0;
+      const uint8_t level = level_of(from[x]);
       for (auto* channel : view.channel) channel[at] = level;
       if (view.alpha) view.alpha[at] = 255;
     }
   }
   clear_padding(view);
+}
+
+// White where the label is that of an object, else black.
+inline void write_mask(const scene::Plane& labels, const MutableImageView& view) {
+  write_grey(labels, view,
+             [](uint8_t label) -> uint8_t { return label == scene::kObjectLabel ? 255 : 0; });
+}
+
+inline void write_labels(const scene::Plane& labels, const MutableImageView& view) {
+  write_grey(labels, view, [](uint8_t label) { return label; });
 }
 
 }  // namespace qdmd

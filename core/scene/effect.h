@@ -18,7 +18,7 @@ namespace qdmd::scene {
 // meter, the mask in expose and lens.
 enum Stage : unsigned {
   kWorld = 1 << 0,   // the background of this frame
-  kGround = 1 << 1,  // what objects do to the background: shadows
+  kGround = 1 << 1,  // what objects do to the background: shadows, mirror images
   kExpose = 1 << 2,  // how long the shutter is open while objects move
   kAir = 1 << 3,     // between the objects and the camera
   kLens = 1 << 4,    // where the picture falls, and how sharp
@@ -56,9 +56,10 @@ struct FrameState {
   int width = 0, height = 0, margin = 0;  // pixels of the frame, and around it
 
   Picture world;                    // the background of this frame
+  Sprite front;                     // what of it is nearer than any object; no runs: nothing
   Picture picture, truth;           // with objects, without
   Plane coverage;                   // 255 where an object covers the whole pixel
-  Plane shadow;                     // 255 where an object's shadow falls
+  Plane shadow;                     // 255 where an object changes the ground
   double shift_x = 0, shift_y = 0;  // pixels by which the frame looks beside its place
   Light light;
 

@@ -55,10 +55,10 @@ void paint_sprite(const Sprite& sprite, int x, int y, Picture* canvas) {
              });
 }
 
-void paint_coverage(const Sprite& sprite, int x, int y, Plane* canvas) {
+void paint_coverage(const Sprite& sprite, int x, int y, uint8_t coverage, Plane* canvas) {
   visit_runs(sprite, x, y, canvas->width, canvas->height,
              [&](int row, int left, int length, const Sprite::Run&, int) {
-               std::memset(canvas->at(left, row), 255, static_cast<size_t>(length));
+               std::memset(canvas->at(left, row), coverage, static_cast<size_t>(length));
              });
 }
 

@@ -23,7 +23,7 @@ void visit_runs(const Sprite& sprite, int x, int y, int width, int height, Visit
 
 // (x, y) in the canvas's coordinates.
 void paint_sprite(const Sprite& sprite, int x, int y, Picture* canvas);
-void paint_coverage(const Sprite& sprite, int x, int y, Plane* canvas);
+void paint_coverage(const Sprite& sprite, int x, int y, uint8_t coverage, Plane* canvas);
 
 // What falls into the frame at (x, y), in its coordinates, falls again one `width` and one `height`
 // farther on over the whole canvas, however large that is: calls `paint(x, y)`, in the canvas's

@@ -112,6 +112,7 @@ void Scene::paint_world() {
     if (placement.part_of_background)
       paint_sprite(*placement.sprite, placement.x + state_.margin, placement.y + state_.margin,
                    &state_.world);
+  paint_sprite(state_.front, 0, 0, &state_.world);
 }
 
 void Scene::paint_objects() {
@@ -121,13 +122,20 @@ void Scene::paint_objects() {
     state_.coverage.resize(state_.world.width, state_.world.height);
     state_.coverage.fill(0);
   }
+  if (!stages_.ground.empty()) {
+    state_.shadow.resize(state_.world.width, state_.world.height);
+    state_.shadow.fill(0);
+  }
   for (Effect* effect : stages_.ground) effect->ground(state_, placements_);
   for (const Placement& placement : placements_) {
     if (placement.part_of_background) continue;
     const int x = placement.x + state_.margin, y = placement.y + state_.margin;
     if (frame) paint_sprite(*placement.sprite, x, y, &state_.picture);
-    if (labels) paint_coverage(*placement.sprite, x, y, &state_.coverage);
+    if (labels) paint_coverage(*placement.sprite, x, y, 255, &state_.coverage);
   }
+  if (frame) paint_sprite(state_.front, 0, 0, &state_.picture);
+  if (labels) paint_coverage(state_.front, 0, 0, 0, &state_.coverage);
+  if (labels && !stages_.ground.empty()) paint_coverage(state_.front, 0, 0, 0, &state_.shadow);
 }
 
 void Scene::find_boxes() {

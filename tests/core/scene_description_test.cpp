@@ -80,6 +80,14 @@ TEST(SceneDescription, EveryCategoryOfSBMnetIsAPreset) {
   EXPECT_TRUE(parse_scene("default").empty());
 }
 
+// PTZ, thermal and turbulence are not simulated.
+TEST(SceneDescription, EightCategoriesOfCDnetArePresets) {
+  for (const char* name :
+       {"baseline", "bad-weather", "camera-jitter", "dynamic-background",
+        "intermittent-object-motion", "low-framerate", "night-videos", "hard-shadows"})
+    EXPECT_FALSE(parse_scene(name).empty()) << name;
+}
+
 // ---- Reading ----
 
 TEST(SceneDescription, EveryEffectAloneHasItsStandardValues) {

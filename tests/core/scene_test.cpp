@@ -98,7 +98,9 @@ TEST(Scene, FrameIsBackgroundWhereTheLabelIsZero) {
   names.insert(names.end(),
                {"shadow,motion-blur=1,jitter=3,defocus=2,fade,bands,exposure",
                 "leaves,water,flicker,shadow,abandon,bootstrap,jitter,light-switch",
-                "clutter,remove,stop=2,camouflage,motion-blur,defocus", "shadow=1:length=3"});
+                "clutter,remove,stop=2,camouflage,motion-blur,defocus",
+                "trees=0.5,remove,shadow=0.7:softness=3,mirror,motion-blur,jitter,defocus",
+                "shadow=1:length=3"});
   int scenes = 0;
   for (const auto& name : names) {
     const auto effects = scene::parse_scene(name);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -162,6 +163,24 @@ TEST(SceneSource, WhereTheMaskIsBlackFrameAndTruthAreEqual) {
   EXPECT_GT(different, covered * 9 / 10);
 }
 
+TEST(SceneSource, LabelsAreTheMaskWithShadowsAndEdgesApart) {
+  const std::string scene = "seed=3 num-buffers=60 scene=shadow,mirror,motion-blur truth=";
+  const Frames masks = frames_of(scene + "mask"), labels = frames_of(scene + "labels");
+  const Frames padded = frames_of(scene + "labels", "format=BGRx,width=320,height=240");
+  ASSERT_EQ(labels.size(), masks.size());
+  std::map<uint8_t, size_t> pixels;
+  for (size_t t = 0; t < labels.size(); ++t) {
+    ASSERT_EQ(labels[t].rgb, padded[t].rgb);
+    for (size_t i = 0; i < labels[t].rgb.size(); ++i) {
+      ++pixels[labels[t].rgb[i]];
+      ASSERT_EQ(masks[t].rgb[i] == 255, labels[t].rgb[i] == 255);
+      ASSERT_EQ(labels[t].rgb[i], labels[t].rgb[i - i % 3]);
+    }
+  }
+  ASSERT_EQ(pixels.size(), 4u);
+  for (const int label : {0, 50, 170, 255}) EXPECT_GT(pixels[static_cast<uint8_t>(label)], 3000u);
+}
+
 TEST(SceneSource, EveryFormatHasTheSameColours) {
   const Frames expected =
       frames_of("num-buffers=40 scene=noise truth=none", "format=RGB,width=33,height=17");
@@ -185,7 +204,7 @@ TEST(SceneSource, EveryFormatHasTheSameColours) {
 TEST(SceneSource, AnySize) {
   for (const char* caps : {"format=RGB,width=1,height=1", "format=RGB,width=2,height=301",
                            "format=BGRA,width=641,height=3"})
-    for (const char* truth : {"none", "background", "mask"})
+    for (const char* truth : {"none", "background", "mask", "labels"})
       EXPECT_EQ(frames_of(std::string("num-buffers=5 scene=storm truth=") + truth, caps).size(), 5u)
           << caps;
 }

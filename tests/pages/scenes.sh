@@ -12,9 +12,11 @@ build/tests/scenes/scene-table >"$results/reference.md"
 # The frame at which a scene shows what it is about; 60 where nothing else is said.
 frame_of() {
   case "$1" in
+    low-framerate) echo 2 ;;
     low-rate | very-short) echo 4 ;;
+    trees | dynamic-background) echo 40 ;;
     abandon) echo 90 ;;
-    remove | intermittent-motion) echo 190 ;;
+    remove | intermittent-motion | intermittent-object-motion) echo 190 ;;
     bands) echo 61 ;;
     fade) echo 180 ;;
     light-switch | illumination-changes) echo 135 ;;

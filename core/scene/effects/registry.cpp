@@ -3,12 +3,13 @@
 namespace qdmd::scene {
 
 std::span<const EffectInfo* const> effects() {
-  // Clothes before those who wear them; the night's noise before the sensor's; the codec last.
+  // Clothes before those who wear them; a shadow lies on the floor that mirrors; the night's noise
+  // before the sensor's; the codec last.
   static const EffectInfo* const kEffects[] = {
-      &kLowRate,     &kLength,    &kCamouflage, &kStop,     &kAbandon, &kRemove,
-      &kClutter,     &kBootstrap, &kLeaves,     &kWater,    &kFlicker, &kShadow,
-      &kMotionBlur,  &kRain,      &kSnow,       &kDefocus,  &kJitter,  &kFade,
-      &kLightSwitch, &kNight,     &kBands,      &kExposure, &kNoise,   &kCompression,
+      &kLowRate,    &kLength, &kCamouflage, &kStop,    &kAbandon,     &kRemove, &kClutter,
+      &kBootstrap,  &kLeaves, &kTrees,      &kWater,   &kFlicker,     &kShadow, &kMirror,
+      &kMotionBlur, &kRain,   &kSnow,       &kDefocus, &kJitter,      &kFade,   &kLightSwitch,
+      &kNight,      &kBands,  &kExposure,   &kNoise,   &kCompression,
   };
   return kEffects;
 }
