@@ -9,7 +9,9 @@ GType gst_qdmd_background_output_get_type() {
   static const GEnumValue values[] = {
       {int(Output::background), "The background L(t) at the frame's time", "background"},
       {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
-      {int(Output::mask), "White where the residual exceeds the threshold, else black", "mask"},
+      {int(Output::mask),
+       "White where the residual exceeds the threshold and pixels around agree, else black",
+       "mask"},
       {int(Output::cutout),
        "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
       {0, nullptr, nullptr}};

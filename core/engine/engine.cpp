@@ -157,7 +157,7 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
   if (!ready()) return;
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
-    write_foreground(next_task(Output::mask), 0, frames_.window().pixels(), mask, residual);
+    write_foreground(next_task(Output::mask), frames_.width(), frames_.height(), mask, residual);
   });
 }
 
@@ -207,7 +207,10 @@ void Engine::pop(Output output, const MutableImageView& out) {
     const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
-      const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
+      // Bands of a mask need rows of their neighbours.
+      const bool masked = output == Output::mask || output == Output::cutout;
+      const size_t least = masked ? 4 * kPixelsPerBand : kPixelsPerBand;
+      const auto bands = std::clamp<size_t>(frames_.window().pixels() / least, 1,
                                             static_cast<size_t>(frames_.height()));
       for_bands(workers_->pool(), frames_.height(), static_cast<int>(bands), write);
     } else {

@@ -9,7 +9,7 @@ namespace qdmd {
 enum class Output {
   background,  // L(t)
   foreground,  // |x - L| per channel
-  mask,        // white where |x - L| exceeds the threshold, else black
+  mask,        // white where |x - L| exceeds the threshold and pixels around agree, else black
   cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
 };
 
@@ -30,6 +30,12 @@ double automatic_threshold(double noise);
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold);
 
+// A pixel of a mask is overruled where three fifths of those at most so many rows and columns from
+// it are the other: 2, less in pictures whose short side is below 120 pixels, 0 (it decides alone)
+// below 60. Compression, and noise near the threshold, leave specks and holes of single pixels;
+// what is as narrow as they are goes with them.
+int voting_reach(int width, int height);
+
 // One frame of a window and what its pictures are made of.
 struct OutputTask {
   const uint8_t* x[3];           // the frame's planes
@@ -46,9 +52,9 @@ struct OutputTask {
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count);
 
-// The mask of pixels first .. first + count - 1, as Output::mask has it, and the lengths of their
-// residuals in levels, at most 255. The task's output does not matter.
-void write_foreground(const OutputTask& task, size_t first, size_t count, uint8_t* mask,
+// The mask of the whole picture, as Output::mask has it, and the lengths of its residuals in
+// levels, at most 255. The task's output does not matter.
+void write_foreground(const OutputTask& task, int width, int height, uint8_t* mask,
                       uint8_t* residual);
 
 }  // namespace qdmd
