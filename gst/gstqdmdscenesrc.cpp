@@ -106,8 +106,7 @@ static GType gst_qdmd_scene_src_truth_get_type() {
        "mask"},
       {TRUTH_LABELS,
        "CDnet's grey levels: 0 background, 50 shadow or mirror image, 170 an object covers less "
-       "than "
-       "half of the pixel, 255 object",
+       "than half of the pixel, 255 object",
        "labels"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdSceneSrcTruth", values);

@@ -142,7 +142,7 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
 }
 
 int voting_reach(int width, int height) {
-  return std::min(kMostReach, std::min(width, height) / 60);
+  return std::min(kMostReach, std::min(width, height) / 120);
 }
 
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,

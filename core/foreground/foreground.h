@@ -31,8 +31,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                                            double fixed_threshold);
 
 // A pixel of a mask is overruled where three fifths of those at most so many rows and columns from
-// it are the other: 2, less in pictures whose short side is below 120 pixels, 0 (it decides alone)
-// below 60. Compression, and noise near the threshold, leave specks and holes of single pixels;
+// it are the other: 2, less in pictures whose short side is below 240 pixels, 0 (it decides alone)
+// below 120. Compression, and noise near the threshold, leave specks and holes of single pixels;
 // what is as narrow as they are goes with them.
 int voting_reach(int width, int height);
 

@@ -98,27 +98,6 @@ struct Strip {
   }
 };
 
-// A mask after the vote of the pixels at most `reach` rows and columns away. The border's pixels
-// stand for those outside.
-inline std::vector<uint8_t> voted_by_counting(const std::vector<uint8_t>& mask, int width,
-                                              int height, int reach) {
-  const auto at = [&](int col, int row) {
-    const int inside = std::clamp(row, 0, height - 1) * width + std::clamp(col, 0, width - 1);
-    return mask[static_cast<size_t>(inside)];
-  };
-  std::vector<uint8_t> voted;
-  for (int row = 0; row < height; ++row)
-    for (int col = 0; col < width; ++col) {
-      int white = 0, black = 0;
-      for (int y = -reach; y <= reach; ++y)
-        for (int x = -reach; x <= reach; ++x) ++(at(col + x, row + y) == 255 ? white : black);
-      const bool own = at(col, row) == 255;
-      const bool overruled = 5 * (own ? black : white) >= 3 * (white + black);
-      voted.push_back(own != overruled ? 255 : 0);
-    }
-  return voted;
-}
-
 // Of plain Q-DMD: what it gives can be said exactly. robust_of() has the default method.
 inline EngineOptions window_of(int size) {
   EngineOptions options;

@@ -198,8 +198,7 @@ TEST(EngineLive, LargePicturesWithAndWithoutGaps) {
         const size_t size = std::min<size_t>(t + 1, 3);
         FreshModel model(part_of(clip, t + 1 - size, size), options);
         const auto background = model.background(static_cast<double>(size - 1));
-        ASSERT_TRUE(out.planes() ==
-                    picture_of(clip.frames[t], background, kOutputs[t], 120, kWidth))
+        ASSERT_TRUE(out.planes() == picture_of(clip.frames[t], background, kOutputs[t], 120))
             << bytes << " bytes a pixel, gap " << padding << ", frame " << t;
         // What lies between the rows is not ours.
         for (int row = 0; row < kHeight; ++row)

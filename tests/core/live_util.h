@@ -249,24 +249,19 @@ struct FreshModel {
   }
 };
 
-// A frame's picture by the definition of the output; without a width, of less than 60 rows.
+// A frame's picture by the definition of the output.
 inline std::vector<uint8_t> picture_of(const std::vector<uint8_t>& frame,
                                        const std::vector<uint8_t>& background, Output output,
-                                       double threshold, int width = 0) {
+                                       double threshold) {
   const size_t pixels = frame.size() / 3;
-  std::vector<uint8_t> out(frame.size()), mask(pixels);
+  std::vector<uint8_t> out(frame.size());
   for (size_t p = 0; p < pixels; ++p) {
     int squared = 0;
     for (size_t c = 0; c < 3; ++c) {
       const int difference = frame[c * pixels + p] - background[c * pixels + p];
       squared += difference * difference;
     }
-    mask[p] = std::sqrt(squared) > threshold ? 255 : 0;
-  }
-  const int height = width > 0 ? static_cast<int>(pixels) / width : 0;
-  if (const int reach = voting_reach(width, height); reach > 0)
-    mask = voted_by_counting(mask, width, height, reach);
-  for (size_t p = 0; p < pixels; ++p) {
+    const bool white = std::sqrt(squared) > threshold;
     for (size_t c = 0; c < 3; ++c) {
       const size_t i = c * pixels + p;
       switch (output) {
@@ -277,10 +272,10 @@ inline std::vector<uint8_t> picture_of(const std::vector<uint8_t>& frame,
           out[i] = static_cast<uint8_t>(std::abs(frame[i] - background[i]));
           break;
         case Output::mask:
-          out[i] = mask[p];
+          out[i] = white ? 255 : 0;
           break;
         case Output::cutout:
-          out[i] = mask[p] ? frame[i] : 0;
+          out[i] = white ? frame[i] : 0;
           break;
       }
     }
