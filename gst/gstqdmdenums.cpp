@@ -1,21 +1,34 @@
 #include "gst/gstqdmdenums.h"
 
 #include "core/engine/engine_options.h"
+#include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
 
 using qdmd::Output;
+using qdmd::Shadows;
 
 GType gst_qdmd_background_output_get_type() {
   static const GEnumValue values[] = {
       {int(Output::background), "The background L(t) at the frame's time", "background"},
       {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
       {int(Output::mask),
-       "White where the residual exceeds the threshold and pixels around agree, else black",
+       "White where the frame differs from the background by more than it does by itself, else "
+       "black",
        "mask"},
       {int(Output::cutout),
        "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundOutput", values);
+  return type;
+}
+
+GType gst_qdmd_background_shadows_get_type() {
+  static const GEnumValue values[] = {
+      {int(Shadows::background), "Background", "background"},
+      {int(Shadows::foreground), "Foreground, where they are strong enough", "foreground"},
+      {int(Shadows::marked), "Background, and grey (127) in output=mask", "marked"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundShadows", values);
   return type;
 }
 

@@ -5,9 +5,10 @@
 
 #include "core/learn/method.h"
 
-// Values of `output`, `mode`, `method`, `amplitude` and `solver` are those of the core's
+// Values of `output`, `shadows`, `mode`, `method`, `amplitude` and `solver` are those of the core's
 // enumerations.
 GType gst_qdmd_background_output_get_type();
+GType gst_qdmd_background_shadows_get_type();
 GType gst_qdmd_background_method_get_type();
 GType gst_qdmd_background_amplitude_get_type();
 GType gst_qdmd_background_solver_get_type();

@@ -225,6 +225,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     const bool written = with_engine(self, [&](Engine& engine) {
       const Clock::Span span(engine.clock(), Clock::frames);
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
+      engine.set_shadows(settings.shadows);
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       state->io.write(&frame, settings.output,
                       [&](const MutableImageView& view) { engine.pop(settings.output, view); });
@@ -339,6 +340,7 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   forget_frames(self);
   state->solves_told = 0;
   EngineOptions options = settings.engine;
+  options.colours = colours_of(info);
   options.caller_bytes = FrameIo::bytes(info);
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
@@ -348,7 +350,7 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
-    state->colours = colours_of(info);
+    state->colours = options.colours;
     if (status.ok())
       state->shells.reserve(static_cast<size_t>(engine.delay()) + 1);
     else

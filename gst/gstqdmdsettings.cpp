@@ -174,6 +174,14 @@ const Property kProperties[] = {
                                   0, 1e6, d.time_budget, kAnyTime);
      },
      QDMD_DOUBLE(s.time_budget)},
+    {[](const Settings& d) {
+       return g_param_spec_enum("shadows", "Shadows",
+                                "What masks make of the background in another light: shadows, and "
+                                "floors that mirror",
+                                gst_qdmd_background_shadows_get_type(), gint(d.shadows),
+                                kControllable);
+     },
+     QDMD_ENUM(s.shadows)},
 };
 
 }  // namespace

@@ -4,12 +4,14 @@
 #include <gst/gst.h>
 
 #include "core/engine/engine_options.h"
+#include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
 
 namespace qdmd {
 
 struct Settings {
   Output output = Output::background;
+  Shadows shadows = Shadows::background;
   bool freeze = false, post_messages = false, regions = false;
   int regions_min_area = 0;  // pixels
   double time_budget = 0;    // milliseconds a frame; 0: no limit
@@ -19,7 +21,7 @@ struct Settings {
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 20;
+inline constexpr guint kFirstFreeProperty = 21;
 static_assert(kFirstFreeProperty <= 32, "Settings::asked has a bit for each");
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.

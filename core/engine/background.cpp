@@ -5,13 +5,17 @@
 
 namespace qdmd {
 
-Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room)
-    : room_(room), learner_(std::move(learner)) {
+Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room, Colours colours,
+                       const DecisionSteps& steps)
+    : room_(room),
+      learner_(std::move(learner)),
+      decision_(room.frames->width(), room.frames->height(), colours, steps) {
   learner_->begin(room_);
 }
 
 void Background::forget() {
   learner_->forget();
+  decision_.forget();
   known_ = false;
   state_ = State::learnt;
 }
@@ -52,6 +56,31 @@ void Background::finish(double fixed_threshold) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
   next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], fixed_threshold);
+  // Nobody decides before there is a first model.
+  if (room_.models != Models::two_of_live && !known_ && decision_.new_born()) rehearse();
+}
+
+// What moves is known before the first frame of a stream is decided.
+void Background::rehearse() {
+  constexpr int kEvery = 4;
+  BackgroundModel& model = models_[next()];
+  const ForegroundStatistics& foreground = next_report_.foreground;
+  for (int t = 0; t < snapshots_->size(); t += kEvery) {
+    model.set_time(t);
+    Comparison frame = {{}, &model, foreground.threshold, model.limits()};
+    for (int c = 0; c < kChannels; ++c) frame.x[c] = snapshots_->plane(t, c);
+    decision_.decide(frame, room_.pool);
+  }
+}
+
+void Background::decide(const uint8_t* const x[3], Pool* pool) {
+  const bool fixed = fixed_threshold_ > 0;
+  decision_.decide({{x[0], x[1], x[2]},
+                    &model(),
+                    report_.foreground.threshold,
+                    fixed ? nullptr : model().limits(),
+                    fixed},
+                   pool);
 }
 
 void Background::publish() {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
 #include "core/learn/learner.h"
 
@@ -23,7 +24,8 @@ class Background {
   // Learnt anew with each solve; or held as it was; or held, but for the light of each frame.
   enum class State { learnt, held, held_in_light };
 
-  Background(std::unique_ptr<Learner> learner, const LearnerRoom& room);
+  Background(std::unique_ptr<Learner> learner, const LearnerRoom& room,
+             Colours colours = Colours::rgb, const DecisionSteps& steps = {});
 
   Learner& learner() { return *learner_; }
   // Forgets the model and what earlier windows showed.
@@ -68,16 +70,24 @@ class Background {
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 
-  // A pixel is foreground above this quaternion norm; 0: from the noise.
+  // Decides the pixels of a frame, whose planes are x, against L; frames come in order.
+  void decide(const uint8_t* const x[3], Pool* pool);
+  // What it decided last.
+  Decision& decision() { return decision_; }
+  const Decision& decision() const { return decision_; }
+
+  // A pixel differs above this quaternion norm; 0: from the noise.
   void set_threshold(double fixed);
   double fixed_threshold() const { return fixed_threshold_; }
 
  private:
+  void rehearse();
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 
   LearnerRoom room_;
   std::unique_ptr<Learner> learner_;
+  Decision decision_;
   // Of two, one is in use while the next is built.
   BackgroundModel models_[2];
   int newest_ = 0;

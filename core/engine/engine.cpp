@@ -7,6 +7,7 @@
 #include "core/engine/batch_schedule.h"
 #include "core/engine/live_schedule.h"
 #include "core/passes/bands.h"
+#include "core/passes/residual.h"
 
 namespace qdmd {
 namespace {
@@ -46,8 +47,10 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   background_ = std::make_unique<Background>(
       std::move(learner),
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
-                  &workers_->pool(), &clock_});
+                  &workers_->pool(), &clock_},
+      options.colours, options.steps);
   background_->set_threshold(options.foreground_threshold);
+  background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
     schedule_ = std::make_unique<LiveSchedule>(stage, plan);
@@ -70,6 +73,7 @@ void Engine::close() {
 
 void Engine::flush() {
   queue_ = {};
+  decided_ = false;
   if (schedule_) {
     schedule_->restart();
     background_->forget();
@@ -129,20 +133,23 @@ void Engine::set_threads(int threads) {
   if (workers_) workers_->ask_for(threads);
 }
 
-// What is needed for a picture of the frame in `slot`, without the frame.
+void Engine::set_shadows(Shadows shadows) {
+  shadows_ = shadows;
+  if (background_) background_->decision().set_shadows(shadows);
+}
+
+// What is needed for a picture of L at the time that it is set to.
 OutputTask Engine::task_of(Output output) {
   OutputTask task = {};
   // The background needs no frame, but rows of one are skipped over.
   for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(0, c);
   task.model = &background_->model();
   task.output = output;
-  task.threshold = background_->report().foreground.threshold;
-  if (!(background_->fixed_threshold() > 0)) task.limits = background_->model().limits();
   task.constant_alpha = 255;
   return task;
 }
 
-// What is needed for the next frame's pictures.
+// What is needed for the next frame's pictures, without a mask.
 OutputTask Engine::next_task(Output output) {
   const int index = frames_.size() - queue_.pending, slot = frames_.slot(index);
   schedule_->show(index);
@@ -153,11 +160,31 @@ OutputTask Engine::next_task(Output output) {
   return task;
 }
 
+// Once a frame.
+void Engine::decide_next(OutputTask* task) {
+  // While the side thread works, its work has the pool.
+  if (!decided_)
+    background_->decide(task->x, workers_->side().idle() ? &workers_->pool() : nullptr);
+  decided_ = true;
+  task->mask = background_->decision().mask();
+  task->shaded = background_->decision().shaded();
+}
+
 void Engine::foreground(uint8_t* mask, uint8_t* residual) {
   if (!ready()) return;
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
-    write_foreground(next_task(Output::mask), frames_.width(), frames_.height(), mask, residual);
+    OutputTask task = next_task(Output::mask);
+    decide_next(&task);
+    std::copy_n(task.mask, frames_.window().pixels(), mask);
+    const auto width = static_cast<size_t>(frames_.width());
+    for (int y = 0; y < frames_.height(); ++y) {
+      const size_t first = static_cast<size_t>(y) * width;
+      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      const uint8_t* level[3];
+      background_->decision().level(y, level);
+      residual_norm(x, level, width, residual + first);
+    }
   });
 }
 
@@ -203,14 +230,12 @@ void Engine::pop(Output output, const MutableImageView& out) {
   if (!ready()) return;
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
-    const OutputTask task = next_task(output);
+    OutputTask task = next_task(output);
+    if (output == Output::mask || output == Output::cutout) decide_next(&task);
     const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
-      // Bands of a mask need rows of their neighbours.
-      const bool masked = output == Output::mask || output == Output::cutout;
-      const size_t least = masked ? 4 * kPixelsPerBand : kPixelsPerBand;
-      const auto bands = std::clamp<size_t>(frames_.window().pixels() / least, 1,
+      const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
                                             static_cast<size_t>(frames_.height()));
       for_bands(workers_->pool(), frames_.height(), static_cast<int>(bands), write);
     } else {
@@ -219,6 +244,7 @@ void Engine::pop(Output output, const MutableImageView& out) {
   });
   --queue_.pending;
   --queue_.ready;
+  decided_ = false;
 }
 
 }  // namespace qdmd

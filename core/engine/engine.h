@@ -79,6 +79,8 @@ class Engine {
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
+  // What masks make of pixels that only light tells from the background. Takes effect at once.
+  void set_shadows(Shadows shadows);
   // While on, the background stays the picture that it was, and nothing is solved; only the first
   // model is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
@@ -96,6 +98,7 @@ class Engine {
  private:
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
+  void decide_next(OutputTask* task);
   Status alpha_refused() const;
   template <typename Action>
   auto flushed_if_it_throws(Action action);
@@ -105,10 +108,12 @@ class Engine {
   Clock clock_;
   Pace pace_{&clock_};
   bool freeze_ = false;
+  Shadows shadows_ = Shadows::background;
   FrameStore frames_;
   std::unique_ptr<Background> background_;
   std::unique_ptr<Schedule> schedule_;
   Queue queue_;
+  bool decided_ = false;  // the frame that pop() gives next
   // The last member: its threads end before what they work on.
   std::unique_ptr<Workers> workers_;
 };

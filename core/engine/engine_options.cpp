@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/foreground/decision.h"
 #include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
@@ -50,7 +51,8 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
     return layout;
   }
   layout.bytes = saturating_sum(
-      saturating_sum(layout.store_bytes, options.caller_bytes),
+      saturating_sum(saturating_sum(layout.store_bytes, Decision::bytes(width, height)),
+                     options.caller_bytes),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
                     Workers::count(options.threads)));
   return layout;

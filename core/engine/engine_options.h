@@ -6,6 +6,7 @@
 
 #include "core/base/status.h"
 #include "core/engine/live_plan.h"
+#include "core/foreground/decision.h"
 #include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
@@ -20,6 +21,8 @@ struct EngineOptions : LearnOptions {
   Mode mode = Mode::batch;
   int window_size = 100;                    // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;                         // frames between solves in live mode, up to m; 0: m / 4
+  Colours colours = Colours::rgb;           // of the frames
+  DecisionSteps steps;                      // of masks
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <utility>
 
-#include "core/passes/majority.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
 
@@ -19,71 +18,10 @@ struct BackgroundRun {
   uint8_t* const rows[3] = {level[0], level[1], level[2]};
 };
 
-// The mask of pixels that decide alone.
-void exceeds(const OutputTask& task, size_t first, size_t count, const BackgroundRun& background,
-             uint8_t* mask) {
-  const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
-  foreground_mask(x, background.rows, count, task.threshold,
-                  task.limits ? task.limits + first : nullptr, mask);
+// The mask, grey where only light differs.
+void mark(const uint8_t* mask, const uint8_t* shaded, size_t count, uint8_t* out) {
+  for (size_t p = 0; p < count; ++p) out[p] = mask[p] | (shaded[p] & 127);
 }
-
-constexpr int kVotingRun = static_cast<int>(kMaxRun) - 2 * kMostReach;
-
-// The mask of columns `left` .. left + count() - 1 after the vote, row after row. The border's
-// pixels stand for those outside.
-class VotingStrip {
- public:
-  VotingStrip(const OutputTask& task, int width, int height, int left, int reach, int first_row)
-      : task_(task),
-        width_(width),
-        height_(height),
-        left_(left),
-        count_(static_cast<size_t>(std::min(kVotingRun, width - left))),
-        reach_(reach),
-        row_(first_row),
-        counted_(std::max(0, first_row - reach)) {}
-
-  size_t count() const { return count_; }
-  // Writes the next row, and returns it.
-  const uint8_t* next(uint8_t* mask) {
-    for (const int end = std::min(height_, row_ + reach_ + 1); counted_ < end; ++counted_)
-      count_row(counted_);
-    const uint8_t* around[kRows];
-    for (int i = 0; i <= 2 * reach_; ++i)
-      around[i] = counts_[std::clamp(row_ + i - reach_, 0, height_ - 1) % kRows];
-    vote_row(around, padded_[row_ % kRows] + reach_, count_, reach_, mask);
-    ++row_;
-    return mask;
-  }
-
- private:
-  static constexpr int kRows = 2 * kMostReach + 1;
-
-  void count_row(int row) {
-    const int begin = std::max(0, left_ - reach_);
-    const int end = std::min(width_, left_ + static_cast<int>(count_) + reach_);
-    const size_t first =
-        static_cast<size_t>(row) * static_cast<size_t>(width_) + static_cast<size_t>(begin);
-    const auto size = static_cast<size_t>(end - begin);
-    task_.model->evaluate(first, size, background_.rows);
-    const auto before = static_cast<size_t>(begin - (left_ - reach_));
-    uint8_t* const padded = padded_[row % kRows];
-    exceeds(task_, first, size, background_, padded + before);
-    std::memset(padded, padded[before], before);
-    const size_t whole = count_ + 2 * static_cast<size_t>(reach_);
-    std::memset(padded + before + size, padded[before + size - 1], whole - before - size);
-    count_columns(padded, count_, reach_, counts_[row % kRows]);
-  }
-
-  const OutputTask& task_;
-  int width_, height_, left_;
-  size_t count_;
-  int reach_;
-  int row_;      // next
-  int counted_;  // rows, from the first that is needed
-  BackgroundRun background_;
-  alignas(64) uint8_t padded_[kRows][kMaxRun], counts_[kRows][kMaxRun];
-};
 
 }  // namespace
 
@@ -141,60 +79,13 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   return statistics;
 }
 
-int voting_reach(int width, int height) {
-  return std::min(kMostReach, std::min(width, height) / 120);
-}
-
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count) {
-  const bool masked = task.output == Output::mask || task.output == Output::cutout;
-  const int reach = masked ? voting_reach(out.width, out.height) : 0;
   BackgroundRun background;
-  alignas(64) uint8_t made[3][kMaxRun], mask_run[kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun];
+  alignas(64) uint8_t made[3][kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun];
   if (out.alpha)
     std::memset(constant_alpha, out.alpha_is_padding ? 255 : task.constant_alpha, kMaxRun);
   const auto image_width = static_cast<size_t>(out.width);
-
-  // A run of a row, with its mask where there is one.
-  const auto write_run = [&](size_t first, size_t count, const uint8_t* mask, int row, int left) {
-    const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
-    const uint8_t* channels[3];
-    for (int c = 0; c < kChannels; ++c) {
-      channels[c] = made[c];
-      switch (task.output) {
-        case Output::background:
-          channels[c] = background.level[c];
-          break;
-        case Output::foreground:
-          absolute_residual(x[c], background.level[c], count, made[c]);
-          break;
-        case Output::mask:
-          channels[c] = mask;
-          break;
-        case Output::cutout:
-          apply_mask(x[c], mask, count, made[c]);
-          break;
-      }
-    }
-    const uint8_t* own = constant_alpha;
-    if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
-    if (task.output == Output::cutout && out.alpha && !out.alpha_is_padding) {
-      apply_mask(own, mask, count, alpha);
-      own = alpha;
-    }
-    join_channels(channels, own, count, out, row, left);
-  };
-
-  if (reach > 0) {
-    for (int left = 0; left < out.width; left += kVotingRun) {
-      VotingStrip strip(task, out.width, out.height, left, reach, first_row);
-      for (int row = first_row; row < first_row + row_count; ++row) {
-        const size_t first = static_cast<size_t>(row) * image_width + static_cast<size_t>(left);
-        write_run(first, strip.count(), strip.next(mask_run), row, left);
-      }
-    }
-    return;
-  }
   size_t rows = static_cast<size_t>(row_count), width = image_width;
   // Rows without gaps are one long row.
   if (out.row_stride == out.pixel_stride * out.width) width *= std::exchange(rows, 1);
@@ -202,31 +93,39 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
     for (size_t left = 0; left < width; left += kMaxRun) {
       const size_t count = std::min(kMaxRun, width - left);
       const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
-      task.model->evaluate(first, count, background.rows);
-      if (masked) exceeds(task, first, count, background, mask_run);
-      write_run(first, count, mask_run, first_row + static_cast<int>(row), static_cast<int>(left));
+      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      const uint8_t* const mask = task.mask ? task.mask + first : nullptr;
+      const uint8_t* channels[3] = {made[0], made[1], made[2]};
+      switch (task.output) {
+        case Output::background:
+          task.model->evaluate(first, count, background.rows);
+          std::copy_n(background.rows, kChannels, channels);
+          break;
+        case Output::foreground:
+          task.model->evaluate(first, count, background.rows);
+          for (int c = 0; c < kChannels; ++c)
+            absolute_residual(x[c], background.level[c], count, made[c]);
+          break;
+        case Output::mask:
+          std::fill_n(channels, kChannels, mask);
+          if (task.shaded) {
+            mark(mask, task.shaded + first, count, made[0]);
+            std::fill_n(channels, kChannels, made[0]);
+          }
+          break;
+        case Output::cutout:
+          for (int c = 0; c < kChannels; ++c) apply_mask(x[c], mask, count, made[c]);
+          break;
+      }
+      const uint8_t* own = constant_alpha;
+      if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
+      if (task.output == Output::cutout && out.alpha && !out.alpha_is_padding) {
+        apply_mask(own, mask, count, alpha);
+        own = alpha;
+      }
+      join_channels(channels, own, count, out, first_row + static_cast<int>(row),
+                    static_cast<int>(left));
     }
-}
-
-void write_foreground(const OutputTask& task, int width, int height, uint8_t* mask,
-                      uint8_t* residual) {
-  BackgroundRun background;
-  const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  const int reach = voting_reach(width, height);
-  for (size_t first = 0; first < pixels; first += kMaxRun) {
-    const size_t count = std::min(kMaxRun, pixels - first);
-    task.model->evaluate(first, count, background.rows);
-    const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
-    if (reach == 0) exceeds(task, first, count, background, mask + first);
-    residual_norm(x, background.rows, count, residual + first);
-  }
-  if (reach == 0) return;
-  for (int left = 0; left < width; left += kVotingRun) {
-    VotingStrip strip(task, width, height, left, reach, 0);
-    for (int row = 0; row < height; ++row)
-      strip.next(mask + static_cast<size_t>(row) * static_cast<size_t>(width) +
-                 static_cast<size_t>(left));
-  }
 }
 
 }  // namespace qdmd

@@ -9,7 +9,7 @@ namespace qdmd {
 enum class Output {
   background,  // L(t)
   foreground,  // |x - L| per channel
-  mask,        // white where |x - L| exceeds the threshold and pixels around agree, else black
+  mask,        // white where Decision says foreground, else black
   cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
 };
 
@@ -30,19 +30,15 @@ double automatic_threshold(double noise);
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold);
 
-// A pixel of a mask is overruled where three fifths of those at most so many rows and columns from
-// it are the other: 2, less in pictures whose short side is below 240 pixels, 0 (it decides alone)
-// below 120. Compression, and noise near the threshold, leave specks and holes of single pixels;
-// what is as narrow as they are goes with them.
-int voting_reach(int width, int height);
-
 // One frame of a window and what its pictures are made of.
 struct OutputTask {
   const uint8_t* x[3];           // the frame's planes
   const BackgroundModel* model;  // at the frame's time
   Output output;
-  double threshold;        // quaternion norm, grey levels
-  const uint8_t* limits;   // of each pixel, where that is more; or null
+  // Of mask and cutout: 255 where foreground, else 0; and 255 where the mask's picture is to be
+  // 127, or null.
+  const uint8_t* mask;
+  const uint8_t* shaded;
   const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
   uint8_t constant_alpha;  // this
 };
@@ -51,10 +47,5 @@ struct OutputTask {
 // different rows.
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count);
-
-// The mask of the whole picture, as Output::mask has it, and the lengths of its residuals in
-// levels, at most 255. The task's output does not matter.
-void write_foreground(const OutputTask& task, int width, int height, uint8_t* mask,
-                      uint8_t* residual);
 
 }  // namespace qdmd

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
 #include "core/gram/window.h"
 #include "core/passes/combine.h"
@@ -51,13 +52,15 @@ struct Scene {
   std::vector<float> pictures;
   std::vector<double> coefficients;
   BackgroundModel model;
+  Decision decision;
   int turn = 0;
 
   explicit Scene(const Size& size_)
       : size(size_),
         window(size.window, size.pixels()),
         levels(3 * size.pixels()),
-        pictures(kPictures * size.pixels()) {
+        pictures(kPictures * size.pixels()),
+        decision(size.width, size.height, Colours::rgb) {
     const Camera camera(size.width, size.height, 4);
     for (auto& frame : in) frame.resize(camera.frame_bytes());
     for (auto& frame : out) frame.resize(camera.frame_bytes());
@@ -81,6 +84,10 @@ struct Scene {
   uint8_t* level(int c) { return levels.data() + static_cast<size_t>(c) * size.pixels(); }
   uint8_t* packed_in() { return in[turn % kPool].data(); }
   uint8_t* packed_out() { return out[turn % kPool].data(); }
+  void decide(Shadows shadows) {
+    decision.set_shadows(shadows);
+    decision.decide({{plane(0), plane(1), plane(2)}, &model, 18}, nullptr);
+  }
   void next() { turn = (turn + 1) % size.window; }
 
   void split() {
@@ -202,10 +209,11 @@ void add_output(const char* name, Output output, const Size& size) {
     const OutputTask task = {{scene.plane(0), scene.plane(1), scene.plane(2)},
                              &scene.model,
                              output,
-                             18,
+                             scene.decision.mask(),
                              nullptr,
                              nullptr,
                              255};
+    if (output == Output::mask || output == Output::cutout) scene.decide(Shadows::background);
     write_output(task, view_of(scene.size, scene.packed_out()), 0, scene.size.height);
   });
 }
@@ -317,6 +325,12 @@ void add_all(const Size& size) {
                         static_cast<int>(first));
         }
       });
+  // A frame with boxes on a tenth of its pixels.
+  for (auto [name, shadows] : {std::pair{"decide", Shadows::background},
+                               {"decide_shadows_foreground", Shadows::foreground}})
+    add(
+        name, size, [](Scene&) { return Traffic(); },
+        [shadows](Scene& scene) { scene.decide(shadows); });
   add_output("write_background", Output::background, size);
   add_output("write_foreground", Output::foreground, size);
   add_output("write_mask", Output::mask, size);

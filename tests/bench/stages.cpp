@@ -98,10 +98,11 @@ class Batch {
     const OutputTask task = {{window.plane(slot, 0), window.plane(slot, 1), window.plane(slot, 2)},
                              &model,
                              Output::mask,
-                             background_.report().foreground.threshold,
-                             model.limits(),
+                             background_.decision().mask(),
+                             nullptr,
                              nullptr,
                              255};
+    background_.decide(task.x, &pool_);
     const auto bands = static_cast<int>(std::max<size_t>(1, window.pixels() / kPixelsPerBand));
     for_bands(pool_, c_.height, bands, [&](int first, int count, size_t) {
       write_output(task, view_of(c_, out_.data()), first, count);

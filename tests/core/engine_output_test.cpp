@@ -26,7 +26,7 @@ TEST(EngineOutput, FollowsItsDefinition) {
   std::mt19937 rng(120);
   const Clip clip = moving_box_clip(300, 12, 40, rng);
   for (double fixed : {0.0, 25.0, 3.0}) {
-    auto options = window_of(12);
+    auto options = with_pixels_alone(window_of(12));
     options.dmd.rank = 1;
     options.foreground_threshold = fixed;
     const Outputs out(clip, options);

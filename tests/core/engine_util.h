@@ -106,4 +106,10 @@ inline EngineOptions window_of(int size) {
   return options;
 }
 
+// The same, with masks in which each pixel decides by itself.
+inline EngineOptions with_pixels_alone(EngineOptions options) {
+  options.steps = {false, false, false};
+  return options;
+}
+
 }  // namespace qdmd::test

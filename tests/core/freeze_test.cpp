@@ -28,7 +28,7 @@ TEST(FreezeLive, ThePictureStaysAndNothingIsSolved) {
   std::mt19937 rng(331);
   for (const auto& [rank, omega] : {std::pair{0, 0.0}, {1, 0.0}, {0, 1e9}}) {
     const Clip clip = moving_box_clip(200, 60, 30, rng);
-    auto options = live_of(24, 5);
+    auto options = with_pixels_alone(live_of(24, 5));
     options.dmd.rank = rank;
     options.dmd.omega_threshold = omega;
     Strip strip(200, options);

@@ -330,8 +330,9 @@ class NaiveLive {
 };
 
 // Pushes a clip through a live engine and compares every picture.
-inline void expect_naive(const Clip& clip, const EngineOptions& options,
+inline void expect_naive(const Clip& clip, EngineOptions options,
                          Output output = Output::background) {
+  options = with_pixels_alone(options);
   Strip strip(clip.pixels, options);
   NaiveLive naive(clip, options);
   for (size_t t = 0; t < clip.size(); ++t) {

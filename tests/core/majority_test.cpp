@@ -1,7 +1,7 @@
 // The majority of a mask's pixels: against counting, and in the pictures that the engine writes.
 #include "core/passes/majority.h"
 
-#include "core/foreground/foreground.h"
+#include "core/foreground/decision.h"
 #include "tests/core/engine_util.h"
 #include "tests/core/simd_targets.h"
 
@@ -95,6 +95,7 @@ std::vector<std::vector<uint8_t>> pictures(const std::vector<std::vector<uint8_t
   auto options = window_of(static_cast<int>(frames.size()));
   options.dmd.rank = 1;
   options.foreground_threshold = 21;
+  options.steps.light = false;
   options.threads = threads;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, width, height).ok());

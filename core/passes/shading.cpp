@@ -1,0 +1,109 @@
+#include "core/passes/shading.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/shading.cpp"
+#include "core/passes/simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+namespace {
+
+constexpr int kWhole = static_cast<int>(kShadingRun) + 2 * kShadingReach;
+
+// <x, L>, <L, L> and <x, x> of columns of pixels.
+struct Products {
+  alignas(64) int32_t xl[kWhole], ll[kWhole], xx[kWhole];
+};
+
+}  // namespace
+
+// Plain loops, which the compiler makes vectors of for each instruction set.
+
+// Of pixels alone. Returns whether any is shaded.
+bool shaded_alone(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
+                  const uint8_t* HWY_RESTRICT differing, const uint8_t* HWY_RESTRICT limit,
+                  int count, uint8_t* HWY_RESTRICT out) {
+  const uint8_t *xr = x[kShadingReach], *xg = x[kShadingAlong + kShadingReach],
+                *xb = x[2 * kShadingAlong + kShadingReach];
+  const uint8_t *lr = l[kShadingReach], *lg = l[kShadingAlong + kShadingReach],
+                *lb = l[2 * kShadingAlong + kShadingReach];
+  const int red = black[0], green = black[1], blue = black[2];
+  int any = 0;
+  for (int p = 0; p < count; ++p) {
+    const auto r = static_cast<float>(xr[p] - red), g = static_cast<float>(xg[p] - green),
+               b = static_cast<float>(xb[p] - blue);
+    const auto lit_r = static_cast<float>(lr[p] - red), lit_g = static_cast<float>(lg[p] - green),
+               lit_b = static_cast<float>(lb[p] - blue);
+    const float xl = r * lit_r + g * lit_g + b * lit_b;
+    const float ll = lit_r * lit_r + lit_g * lit_g + lit_b * lit_b;
+    // |rest| |L| is the length of the vector part of conj(x) L.
+    const float i = g * lit_b - b * lit_g, j = b * lit_r - r * lit_b, k = r * lit_g - g * lit_r;
+    const float own = limit[p], most = std::max(36.0f, own * own);
+    const bool lit = (ll > 0) & (2 * xl >= ll) & (20 * xl <= 23 * ll);
+    const int shaded = lit & (4 * (i * i + j * j + k * k) <= most * ll) ? differing[p] : 0;
+    any |= shaded;
+    out[p] = static_cast<uint8_t>(shaded);
+  }
+  return any != 0;
+}
+
+// Takes out of `out` where the pixels around have another texture. Sums of 25 products are below
+// 2^23, which floats hold; the products of two such sums lose less than 0.02 squared levels.
+void alike_around(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
+                  const uint8_t* HWY_RESTRICT limit, int count, uint8_t* HWY_RESTRICT out) {
+  const int whole = count + 2 * kShadingReach;
+  const int red = black[0], green = black[1], blue = black[2];
+  Products columns;
+  std::fill_n(columns.xl, whole, 0), std::fill_n(columns.ll, whole, 0);
+  std::fill_n(columns.xx, whole, 0);
+  for (int row = 0; row < kShadingAlong; ++row) {
+    const uint8_t *xr = x[row] - kShadingReach, *xg = x[kShadingAlong + row] - kShadingReach,
+                  *xb = x[2 * kShadingAlong + row] - kShadingReach;
+    const uint8_t *lr = l[row] - kShadingReach, *lg = l[kShadingAlong + row] - kShadingReach,
+                  *lb = l[2 * kShadingAlong + row] - kShadingReach;
+    for (int p = 0; p < whole; ++p) {
+      const int r = xr[p] - red, g = xg[p] - green, b = xb[p] - blue;
+      const int lit_r = lr[p] - red, lit_g = lg[p] - green, lit_b = lb[p] - blue;
+      columns.xl[p] += r * lit_r + g * lit_g + b * lit_b;
+      columns.ll[p] += lit_r * lit_r + lit_g * lit_g + lit_b * lit_b;
+      columns.xx[p] += r * r + g * g + b * b;
+    }
+  }
+  const auto around = [](const int32_t* column) {
+    return column[0] + column[1] + column[2] + column[3] + column[4];
+  };
+  for (int p = 0; p < count; ++p) {
+    const auto a = static_cast<float>(around(columns.xl + p)),
+               b = static_cast<float>(around(columns.ll + p)),
+               c = static_cast<float>(around(columns.xx + p));
+    const float own = limit[p], most = std::max(144.0f, 9 * own * own);
+    const bool alike = 16 * (c * b - a * a) <= most * (kShadingAlong * kShadingAlong) * b;
+    out[p] = alike ? out[p] : 0;
+  }
+}
+
+void shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
+            const uint8_t* differing, const uint8_t* limit, int count, uint8_t* out) {
+  if (shaded_alone(x, l, black, differing, limit, count, out))
+    alike_around(x, l, black, limit, count, out);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+
+HWY_EXPORT(shaded);
+
+void find_shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
+                 const uint8_t* differing, const uint8_t* limit, size_t count, uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(shaded)(x, l, black, differing, limit, static_cast<int>(count), out);
+}
+
+}  // namespace qdmd
+#endif
