@@ -18,9 +18,10 @@ namespace {
 constexpr size_t kPixelsPerPart = 65536;
 // A pixel that is explained: another is nearer than this share of its own distance, squared.
 constexpr uint32_t kNearer = 9, kNearerOf = 100;
-// Above so many mean distances a pixel in a texture that moves is foreground. Of noise that is
-// Gaussian, 4.3 of them are the 4 sqrt(3) sigma of automatic_threshold().
-constexpr int kMeanDistances = 1101;  // 1/256
+// Above so many mean distances from what is around, in 1/256, a pixel in a texture that moves is
+// foreground. Of Gaussian noise, 4.3 would be the 4 sqrt(3) sigma of automatic_threshold(); leaves
+// are further off now and then.
+constexpr int kMeanDistances = 1536;  // 1/256
 // Runs end at multiples of it where the row goes on: no vector is begun for a few pixels.
 constexpr int kRunUnit = 32, kLongestRun = 256;
 
@@ -196,7 +197,7 @@ void Decision::explain_span(const Comparison& frame, int y, int grid_row, int fi
       } else {
         uint16_t* const noise = texture_.noise(y) + left + p;
         leave_texture(run.nearest + p, noise, run.limit + p, size, differing + p);
-        texture_.learn(cell, run.own + p, size, noise);
+        texture_.learn(cell, run.nearest + p, size, noise);
       }
       p = end;
       if (left + end == grid.left(col + 1)) ++col;

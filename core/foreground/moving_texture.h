@@ -38,8 +38,8 @@ class MovingTexture {
   // After the last cell of a frame.
   void end_frame();
 
-  // Of a row of pixels in cells that move: what they differ by on average, in 1/256 level. What is
-  // known elsewhere is of no use.
+  // Of a row of pixels in cells that move: how far they are on average from the nearest background
+  // around, in 1/256 level. What is known elsewhere is of no use.
   uint16_t* noise(int y) {
     return noise_.data() + static_cast<size_t>(y) * static_cast<size_t>(grid_.width);
   }

@@ -1,0 +1,415 @@
+// Masks: the passes behind them against their definitions, and what they make of light, of textures
+// that move, and of pictures in which there is little to see.
+#include "core/foreground/decision.h"
+
+#include "core/passes/distance.h"
+#include "core/passes/shading.h"
+#include "tests/core/engine_util.h"
+#include "tests/core/simd_targets.h"
+
+namespace qdmd::test {
+namespace {
+
+// ---- Passes ----
+
+// Rows of three channels with `margin` samples more on both sides, before an inaccessible page.
+struct Rows {
+  Rows(size_t rows, size_t count, size_t margin_, std::mt19937& rng) : margin(margin_) {
+    for (size_t i = 0; i < 3 * rows; ++i) {
+      memory.push_back(std::make_unique<BeforeTheEdge<uint8_t>>(count + 2 * margin));
+      for (uint8_t& sample : *memory.back()) sample = static_cast<uint8_t>(rng() % 256);
+      at.push_back(memory.back()->data() + margin);
+    }
+  }
+  size_t margin;
+  std::vector<std::unique_ptr<BeforeTheEdge<uint8_t>>> memory;
+  std::vector<uint8_t*> at;
+
+  const uint8_t* const* data() const { return const_cast<const uint8_t* const*>(at.data()); }
+};
+
+TEST(Distance, IsTheNearestOfThePixelsAround) {
+  std::mt19937 rng(320);
+  on_every_target([&] {
+    for (size_t count : {1u, 2u, 15u, 16u, 33u, 64u, 257u})
+      for (int step : {1, 4}) {
+        Rows x(1, count, 0, rng), l(kPlacesAlong, count, static_cast<size_t>(kPlaces * step), rng);
+        BeforeTheEdge<uint16_t> own(count), nearest(count);
+        const uint8_t* const middle[3] = {l.at[kPlaces], l.at[kPlacesAlong + kPlaces],
+                                          l.at[2 * kPlacesAlong + kPlaces]};
+        squared_distance(x.data(), middle, count, own.data());
+        nearest_distance(x.data(), l.data(), count, step, nearest.data());
+        for (int p = 0; p < static_cast<int>(count); ++p) {
+          int least = 65535;
+          for (int row = 0; row < kPlacesAlong; ++row)
+            for (int col = -kPlaces; col <= kPlaces; ++col) {
+              int sum = 0;
+              for (int c = 0; c < 3; ++c) {
+                const int d =
+                    x.at[size_t(c)][p] - l.at[size_t(c * kPlacesAlong + row)][p + col * step];
+                sum += d * d;
+              }
+              least = std::min(least, sum);
+              if (row == kPlaces && col == 0) {
+                ASSERT_EQ(own[size_t(p)], std::min(sum, 65535)) << p << " of " << count;
+              }
+            }
+          ASSERT_EQ(nearest[size_t(p)], least) << p << " of " << count;
+        }
+      }
+  });
+}
+
+TEST(Shading, FollowsItsDefinition) {
+  std::mt19937 rng(321);
+  size_t shaded = 0, others = 0;
+  on_every_target([&] {
+    for (size_t count : {1u, 2u, 7u, 16u, 31u, 32u})
+      for (const auto& black : {std::array<uint8_t, 3>{0, 0, 0}, {16, 128, 128}}) {
+        Rows l(kShadingAlong, count, kShadingReach, rng),
+            x(kShadingAlong, count, kShadingReach, rng);
+        // About the background in another light.
+        const double gain = 0.4 + 0.001 * static_cast<double>(rng() % 900);
+        for (size_t row = 0; row < l.at.size(); ++row)
+          for (size_t i = 0; i < count + 2 * kShadingReach; ++i) {
+            const int dark = black[row / kShadingAlong];
+            const double lit = dark + gain * (l.at[row][i - kShadingReach] - dark);
+            x.at[row][i - kShadingReach] = static_cast<uint8_t>(
+                std::clamp(lit + static_cast<double>(rng() % 9) - 4, 0.0, 255.0));
+          }
+        BeforeTheEdge<uint8_t> differing(count), limit(count), out(count);
+        for (size_t p = 0; p < count; ++p) {
+          differing[p] = rng() % 4 ? 255 : 0;
+          limit[p] = static_cast<uint8_t>(rng() % 3 ? 4 + rng() % 20 : rng() % 256);
+        }
+        find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), count,
+                    out.data());
+        for (int p = 0; p < static_cast<int>(count); ++p) {
+          // <x, L>, <L, L>, <x, x> of the pixel, and of those around.
+          double own[3] = {}, around[3] = {};
+          for (int row = 0; row < kShadingAlong; ++row)
+            for (int col = -kShadingReach; col <= kShadingReach; ++col)
+              for (int c = 0; c < 3; ++c) {
+                const auto at = static_cast<size_t>(c * kShadingAlong + row);
+                const double a = x.at[at][p + col] - black[size_t(c)];
+                const double b = l.at[at][p + col] - black[size_t(c)];
+                const double products[3] = {a * b, b * b, a * a};
+                for (int k = 0; k < 3; ++k) {
+                  around[k] += products[k] / (kShadingAlong * kShadingAlong);
+                  if (row == kShadingReach && col == 0) own[k] += products[k];
+                }
+              }
+          const auto rest = [](const double sums[3]) {
+            return sums[2] - sums[0] * sums[0] / sums[1];
+          };
+          const double a = own[0] / own[1];
+          const double most = std::max(3.0, 0.5 * limit[size_t(p)]);
+          const double texture = std::max(3.0, 0.75 * limit[size_t(p)]);
+          // What floats round away decides nothing here.
+          if (std::abs(rest(own) - most * most) < 0.05 || std::abs(a - 0.5) < 1e-5 ||
+              std::abs(rest(around) - texture * texture) < 0.05 || std::abs(a - 1.15) < 1e-5)
+            continue;
+          const bool expected = differing[size_t(p)] && own[1] > 0 && a >= 0.5 && a <= 1.15 &&
+                                rest(own) <= most * most && rest(around) <= texture * texture;
+          ++(expected ? shaded : others);
+          ASSERT_EQ(out[size_t(p)], expected ? 255 : 0) << p << " of " << count;
+        }
+      }
+  });
+  EXPECT_GT(shaded, 50u);
+  EXPECT_GT(others, 50u);
+}
+
+// ---- Decisions ----
+
+// Planes of a picture.
+struct Planes {
+  int width, height;
+  std::vector<uint8_t> level[3];
+
+  Planes(int w, int h) : width(w), height(h) {
+    for (auto& plane : level) plane.resize(static_cast<size_t>(w) * static_cast<size_t>(h));
+  }
+  size_t pixels() const { return level[0].size(); }
+  uint8_t& at(int c, int x, int y) {
+    return level[c][static_cast<size_t>(std::clamp(y, 0, height - 1) * width +
+                                        std::clamp(x, 0, width - 1))];
+  }
+};
+
+// What a model makes of one picture, for ever.
+BackgroundModel model_of(const Planes& background) {
+  BackgroundModel model;
+  model.make_room(background.pixels(), false);
+  model.freeze_as(background.level, nullptr, background.pixels());
+  model.set_time(0);
+  return model;
+}
+
+struct Decided {
+  Decided(const Planes& background, const DecisionSteps& steps = {}, Colours colours = Colours::rgb)
+      : model(model_of(background)),
+        decision(background.width, background.height, colours, steps) {}
+  const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
+    decision.decide(
+        {{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()}, &model, 18}, pool);
+    return decision.mask();
+  }
+  BackgroundModel model;
+  Decision decision;
+};
+
+// A floor with a texture, in colours.
+Planes floor_of(int width, int height, std::mt19937& rng) {
+  Planes floor(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const int grain = static_cast<int>(rng() % 41) - 20;
+      floor.at(0, x, y) = static_cast<uint8_t>(150 + grain);
+      floor.at(1, x, y) = static_cast<uint8_t>(130 + grain);
+      floor.at(2, x, y) = static_cast<uint8_t>(100 + grain);
+    }
+  return floor;
+}
+
+size_t white(const uint8_t* mask, size_t count) {
+  return static_cast<size_t>(std::count(mask, mask + count, uint8_t{255}));
+}
+
+TEST(Light, IsNoForeground) {
+  std::mt19937 rng(322);
+  for (Colours colours : {Colours::rgb, Colours::yuv, Colours::grey}) {
+    SCOPED_TRACE(static_cast<int>(colours));
+    const auto samples = [&](Planes picture) {
+      if (colours == Colours::rgb) return picture;
+      for (size_t p = 0; p < picture.pixels(); ++p) {
+        const double r = picture.level[0][p], g = picture.level[1][p], b = picture.level[2][p];
+        const double y = 0.299 * r + 0.587 * g + 0.114 * b;
+        const bool grey = colours == Colours::grey;
+        picture.level[0][p] = static_cast<uint8_t>(grey ? y : 16.5 + 0.859 * y);
+        picture.level[1][p] = static_cast<uint8_t>(grey ? y : 128.5 + 0.496 * (b - y));
+        picture.level[2][p] = static_cast<uint8_t>(grey ? y : 128.5 + 0.627 * (r - y));
+      }
+      return picture;
+    };
+    const Planes floor = floor_of(320, 240, rng);
+    Planes frame = floor;
+    // A shadow on the left half, a light on the right one, and somebody in between.
+    const auto somebody = [](int x, int y) {
+      return std::abs(x - 160) < 20 && std::abs(y - 120) < 50;
+    };
+    for (int c = 0; c < 3; ++c)
+      for (int y = 0; y < 240; ++y)
+        for (int x = 0; x < 320; ++x) {
+          uint8_t& level = frame.at(c, x, y);
+          level = static_cast<uint8_t>(level * (x < 160 ? 0.65 : 1.12));
+          if (somebody(x, y)) level = c == 2 ? 170 : 60;
+        }
+    for (Shadows shadows : {Shadows::background, Shadows::foreground, Shadows::marked}) {
+      Decided decided(samples(floor), {}, colours);
+      decided.decision.set_shadows(shadows);
+      const uint8_t* mask = decided(samples(frame));
+      size_t inside = 0, dark = 0, marked = 0;
+      for (int y = 0; y < 240; ++y)
+        for (int x = 0; x < 320; ++x) {
+          const auto p = static_cast<size_t>(y * 320 + x);
+          if (somebody(x, y)) inside += mask[p] == 255;
+          if (x < 130) dark += mask[p] == 255;
+          if (x < 130 && decided.decision.shaded()) marked += decided.decision.shaded()[p] == 255;
+        }
+      EXPECT_GT(inside, 0.97 * 39 * 99);
+      // A grey picture has no colour by which light could be told from things.
+      if (shadows == Shadows::foreground || colours == Colours::grey) {
+        EXPECT_GT(dark, 0.95 * 130 * 240);
+      } else {
+        EXPECT_LT(dark, 0.01 * 130 * 240);
+      }
+      if (shadows == Shadows::marked && colours != Colours::grey) {
+        EXPECT_GT(marked, 0.95 * 130 * 240);
+      }
+      EXPECT_EQ(decided.decision.shaded() != nullptr, shadows == Shadows::marked);
+    }
+  }
+}
+
+// Leaves: the picture, each part of it moved a little by itself.
+Planes in_wind(Planes& leaves, int right, std::mt19937& rng) {
+  Planes moved = leaves;
+  for (int top = 0; top < leaves.height; top += 8)
+    for (int left = 0; left < right; left += 8) {
+      const int dx = static_cast<int>(rng() % 5) - 2, dy = static_cast<int>(rng() % 5) - 2;
+      for (int y = top; y < std::min(top + 8, leaves.height); ++y)
+        for (int x = left; x < std::min(left + 8, right); ++x)
+          for (int c = 0; c < 3; ++c) moved.at(c, x, y) = leaves.at(c, x + dx, y + dy);
+    }
+  return moved;
+}
+
+Planes leaves_of(int width, int height, std::mt19937& rng) {
+  Planes leaves(width, height);
+  for (int y = 0; y < height; y += 3)
+    for (int x = 0; x < width; x += 3) {
+      const bool leaf = rng() % 2;
+      for (int c = 0; c < 3; ++c)
+        for (int i = 0; i < 9; ++i)
+          leaves.at(c, x + i % 3, y + i / 3) =
+              static_cast<uint8_t>((leaf ? 70 - 20 * c : 200) + static_cast<int>(rng() % 9));
+    }
+  return leaves;
+}
+
+TEST(MovingTexture, IsNoForeground) {
+  std::mt19937 rng(323);
+  Planes leaves = leaves_of(320, 240, rng);
+  for (bool known : {true, false}) {
+    Decided decided(leaves, {true, known, true});
+    size_t false_positives = 0, hits = 0;
+    for (int t = 0; t < 200; ++t) {
+      Planes frame = in_wind(leaves, 200, rng);
+      // Somebody goes past, from frame 100 on.
+      const int left = t < 100 ? 400 : 2 * (t - 100);
+      for (int y = 60; y < 180; ++y)
+        for (int x = left; x < std::min(320, left + 40); ++x)
+          for (int c = 0; c < 3; ++c) frame.at(c, x, y) = c == 2 ? 220 : 90;
+      const uint8_t* mask = decided(frame);
+      if (t < 50) continue;
+      const size_t all = white(mask, frame.pixels());
+      size_t inside = 0;
+      for (int y = 60; y < 180; ++y)
+        for (int x = left; x < std::min(320, left + 40); ++x) inside += mask[y * 320 + x] == 255;
+      hits += inside;
+      false_positives += all - inside;
+    }
+    const double of_leaves = static_cast<double>(false_positives) / (150.0 * 200 * 240);
+    if (known) {
+      EXPECT_LT(of_leaves, 0.005);
+      EXPECT_GT(static_cast<double>(hits), 0.8 * 100 * 40 * 120);
+    } else {
+      EXPECT_GT(of_leaves, 0.05) << "they move";
+    }
+  }
+}
+
+TEST(MovingTexture, IsNobodyWhoStays) {
+  std::mt19937 rng(324);
+  const Planes floor = floor_of(320, 240, rng);
+  Decided decided(floor);
+  size_t hits = 0;
+  for (int t = 0; t < 400; ++t) {
+    Planes frame = floor;
+    // Stays from frame 60 on, and does not stand still.
+    const int left = 140 + static_cast<int>(rng() % 3);
+    if (t >= 60)
+      for (int y = 60; y < 180; ++y)
+        for (int x = left; x < left + 40; ++x)
+          for (int c = 0; c < 3; ++c)
+            frame.at(c, x, y) = static_cast<uint8_t>(c == 0 ? 30 + (y + x - left) % 20 : 70);
+    const uint8_t* mask = decided(frame);
+    if (t >= 60) hits += white(mask, frame.pixels());
+  }
+  EXPECT_GT(static_cast<double>(hits), 0.97 * 340 * 40 * 120);
+}
+
+TEST(Decision, DoesNotDependOnThreadsOrOnThePast) {
+  std::mt19937 rng(325);
+  Planes leaves = leaves_of(700, 500, rng);
+  Decided one(leaves), three(leaves), again(leaves);
+  Pool pool(3);
+  std::vector<Planes> frames;
+  for (int t = 0; t < 60; ++t) frames.push_back(in_wind(leaves, 400, rng));
+  for (const Planes& frame : frames) again(frame);
+  again.decision.forget();
+  EXPECT_TRUE(again.decision.new_born());
+  for (const Planes& frame : frames) {
+    const uint8_t* const expected = one(frame);
+    ASSERT_TRUE(std::equal(expected, expected + frame.pixels(), three(frame, &pool)));
+    ASSERT_TRUE(std::equal(expected, expected + frame.pixels(), again(frame)));
+  }
+}
+
+// ---- Streams in which there is little to see, at the defaults ----
+
+// The share of white in each mask.
+std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode) {
+  EngineOptions options;
+  options.mode = mode;
+  options.window_size = 50;
+  options.threads = 1;
+  Engine engine;
+  EXPECT_TRUE(engine.configure(options, frames[0].width, frames[0].height).ok());
+  Picture picture(frames[0].width, frames[0].height, 3, false, 0);
+  std::vector<double> shares;
+  const auto pop = [&] {
+    while (engine.ready()) {
+      engine.pop(Output::mask, picture.out());
+      const auto planes = picture.planes();
+      const size_t pixels = frames[0].pixels();
+      for (size_t i = 0; i < planes.size(); ++i) EXPECT_TRUE(planes[i] == 0 || planes[i] == 255);
+      shares.push_back(static_cast<double>(white(planes.data(), pixels)) /
+                       static_cast<double>(pixels));
+    }
+  };
+  for (const Planes& frame : frames) {
+    std::vector<uint8_t> planes;
+    for (const auto& level : frame.level) planes.insert(planes.end(), level.begin(), level.end());
+    picture.fill(planes);
+    EXPECT_TRUE(engine.push(picture.in()).ok());
+    pop();
+  }
+  EXPECT_TRUE(engine.drain().ok());
+  pop();
+  EXPECT_EQ(shares.size(), frames.size());
+  return shares;
+}
+
+TEST(LittleToSee, HasNoForeground) {
+  std::mt19937 rng(326);
+  for (Mode mode : {Mode::batch, Mode::live})
+    for (auto [width, height] : {std::pair{1, 1}, {1, 40}, {300, 1}, {2, 3}, {64, 48}})
+      for (int level : {0, 1, 90, 255})
+        for (size_t count : {1u, 2u, 60u}) {
+          SCOPED_TRACE(testing::Message() << width << "x" << height << " of " << level);
+          Planes still(width, height);
+          for (auto& plane : still.level)
+            for (uint8_t& sample : plane)
+              sample = static_cast<uint8_t>(level == 90 ? rng() % 256 : static_cast<size_t>(level));
+          for (double share : masks_of({count, still}, mode)) ASSERT_EQ(share, 0);
+        }
+}
+
+TEST(LittleToSee, NoiseIsNoForeground) {
+  std::mt19937 rng(327);
+  for (double sigma : {1.0, 5.0, 12.0}) {
+    std::normal_distribution<double> noise(0, sigma);
+    const Planes floor = floor_of(160, 120, rng);
+    std::vector<Planes> frames(120, floor);
+    for (Planes& frame : frames)
+      for (auto& plane : frame.level)
+        for (uint8_t& sample : plane)
+          sample = static_cast<uint8_t>(std::lround(std::clamp(sample + noise(rng), 0.0, 255.0)));
+    for (Mode mode : {Mode::batch, Mode::live}) {
+      const auto shares = masks_of(frames, mode);
+      // Live: once there is a model of more than a frame.
+      const auto first = shares.begin() + (mode == Mode::live ? 20 : 0);
+      const double mean = std::accumulate(first, shares.end(), 0.0) / double(shares.end() - first);
+      EXPECT_LT(mean, 1e-4) << sigma;
+    }
+  }
+}
+
+TEST(LittleToSee, ALensThatWasCovered) {
+  std::mt19937 rng(328);
+  const Planes floor = floor_of(160, 120, rng);
+  std::vector<Planes> frames(150, floor);
+  for (size_t t = 70; t < 80; ++t) frames[t] = Planes(160, 120);
+  for (Mode mode : {Mode::batch, Mode::live}) {
+    const auto shares = masks_of(frames, mode);
+    for (size_t t = 0; t < shares.size(); ++t)
+      if (t < 70 || t > 82) {
+        EXPECT_LT(shares[t], 0.01) << t;
+      }
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test
