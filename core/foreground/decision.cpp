@@ -18,10 +18,17 @@ namespace {
 constexpr size_t kPixelsPerPart = 65536;
 // A pixel that is explained: another is nearer than this share of its own distance, squared.
 constexpr uint32_t kNearer = 9, kNearerOf = 100;
-// Above so many mean distances from what is around, in 1/256, a pixel in a texture that moves is
-// foreground. Of Gaussian noise, 4.3 would be the 4 sqrt(3) sigma of automatic_threshold(); leaves
-// are further off now and then.
-constexpr int kMeanDistances = 1536;  // 1/256
+// Above so many mean distances, in 1/256, a pixel is foreground. Of Gaussian noise, 4.3 are the
+// 4 sqrt(3) sigma of automatic_threshold(). Leaves are further from what is around now and then.
+constexpr int kMeanDistances = 1101, kMeansOfTextures = 1536;
+// Every so manieth row of a frame tells how far its pixels are from L, other rows of each frame;
+// each of them counts at least 1 / kNoiseFrames.
+constexpr int kNoiseRows = 4, kNoiseFrames = 16;
+// Pixels at most so far from foreground say nothing of noise.
+constexpr int kNearForeground = 4;
+// Where noise alone asks for a threshold above this, in levels, means of 3 x 3 pixels are compared:
+// their noise is a third.
+constexpr double kNoisy = 36, kLeastOfMeans = 18;
 // Runs end at multiples of it where the row goes on: no vector is begun for a few pixels.
 constexpr int kRunUnit = 32, kLongestRun = 256;
 
@@ -43,13 +50,9 @@ void keep_beyond(const uint16_t* own, const uint8_t* limit, int count, uint8_t* 
   for (int p = 0; p < count; ++p) mask[p] = own[p] > limit[p] * limit[p] ? mask[p] : 0;
 }
 
-// Keeps what is further than its texture moves.
-void leave_texture(const uint16_t* nearest, const uint16_t* noise, const uint8_t* limit, int count,
-                   uint8_t* mask) {
-  for (int p = 0; p < count; ++p) {
-    const int most = std::min(255, std::max<int>(limit[p], noise[p] * kMeanDistances >> 16));
-    mask[p] = nearest[p] > most * most ? mask[p] : 0;
-  }
+// The same of mask[p] that is set from `wide` samples to the left to as many to the right.
+void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restrict out) {
+  for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
 }
 
 void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask) {
@@ -66,6 +69,36 @@ struct Decision::Run {
   alignas(64) uint8_t limit[kLongestRun];  // levels
 };
 
+// Rows of a frame, of L and of what differs around a run, with kReach samples more on both sides.
+template <int kReach, int kMost>
+struct Decision::Around {
+  static constexpr int kAlong = 2 * kReach + 1;
+  const uint8_t *x[3 * kAlong], *level[3 * kAlong], *differing[kAlong];
+
+  Around(Decision& all, const Comparison& frame, int y, int left, int count) {
+    const bool at_edge = left < kReach || left + count + kReach > all.width_;
+    for (int i = 0; i < kAlong; ++i) {
+      const int row = std::clamp(y + i - kReach, 0, all.height_ - 1);
+      differing[i] = all.differing_row(row) + left;
+      for (int c = 0; c < kChannels; ++c) {
+        const int at = kAlong * c + i;
+        level[at] = all.level_row(c, row) + left;
+        const uint8_t* const samples =
+            frame.x[c] + static_cast<size_t>(row) * static_cast<size_t>(all.width_);
+        x[at] = samples + left;
+        if (!at_edge) continue;
+        // The border's pixels stand for those outside.
+        for (int p = 0; p < count + 2 * kReach; ++p)
+          inside_[at][p] = samples[std::clamp(left + p - kReach, 0, all.width_ - 1)];
+        x[at] = inside_[at] + kReach;
+      }
+    }
+  }
+
+ private:
+  uint8_t inside_[3 * kAlong][kMost + 2 * kReach];
+};
+
 int voting_reach(int width, int height) {
   return std::min(kMostReach, std::min(width, height) / 120);
 }
@@ -79,7 +112,9 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
       stride_(static_cast<size_t>(width + 2 * margin_)),
       steps_(steps),
       texture_(width, height),
+      noise_(width, height),
       differing_(stride_ * static_cast<size_t>(height)),
+      foreground_(differing_.size()),
       mask_(static_cast<size_t>(width) * static_cast<size_t>(height)),
       shaded_(mask_.size()) {
   for (auto& level : level_) level.resize(differing_.size());
@@ -92,7 +127,14 @@ uint64_t Decision::bytes(int width, int height) {
   const auto margin =
       static_cast<uint64_t>(2 * kPlaces * std::max(1, std::min(width, height) / 240));
   const auto pixels = static_cast<uint64_t>(width) * rows;
-  return 4 * (pixels + margin * rows) + 2 * pixels + MovingTexture::bytes(width, height);
+  return 5 * (pixels + margin * rows) + 2 * pixels + MovingTexture::bytes(width, height) +
+         PixelNoise::bytes(width, height);
+}
+
+void Decision::forget() {
+  texture_.forget();
+  noise_.forget();
+  frames_ = 0;
 }
 
 void Decision::level(int y, const uint8_t* out[3]) const {
@@ -111,14 +153,21 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     else
       band(0, length);
   };
-  in_bands(height_, parts, [&](int first, int size) { compare(frame, first, size); });
-  // A row of cells is at most so much work more than another.
+  noisy_ = steps_.smooth && !frame.fixed && frame.threshold > kNoisy;
+  threshold_ = noisy_ ? std::max(kLeastOfMeans, frame.threshold / 3) : frame.threshold;
   if (shadows_ == Shadows::marked) std::fill(shaded_.begin(), shaded_.end(), uint8_t{0});
+  in_bands(height_, parts, [&](int first, int size) { compare(frame, first, size); });
+  if (noisy_)
+    in_bands(height_, parts, [&](int first, int size) { compare_means(frame, first, size); });
+  // A row of cells is at most so much work more than another.
   in_bands(grid.rows, parts > 1 ? grid.rows : 1, [&](int first, int size) {
     for (int row = first; row < first + size; ++row) explain(frame, row);
   });
   texture_.end_frame();
   in_bands(height_, parts, [&](int first, int size) { vote(first, size); });
+  if (steps_.noise && !frame.fixed)
+    in_bands(height_, parts, [&](int first, int size) { learn(frame, first, size); });
+  ++frames_;
 }
 
 // L, and which pixels differ from it.
@@ -132,9 +181,24 @@ void Decision::compare(const Comparison& frame, int first_row, int row_count) {
                                  level_row(2, y) + left};
       frame.model->evaluate(first, count, level);
       const uint8_t* const x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
-      foreground_mask(x, level, count, frame.threshold, nullptr, differing_row(y) + left);
+      if (!noisy_) foreground_mask(x, level, count, threshold_, nullptr, differing_row(y) + left);
     }
     for (int c = 0; c < kChannels; ++c) repeat_border(level_row(c, y));
+    repeat_border(differing_row(y));
+  }
+}
+
+// Which means differ.
+void Decision::compare_means(const Comparison& frame, int first_row, int row_count) {
+  const auto most = static_cast<int>(threshold_ * threshold_);
+  for (int y = first_row; y < first_row + row_count; ++y) {
+    uint8_t* const row = differing_row(y);
+    for (int left = 0; left < width_; left += kLongestRun) {
+      Run run(y, left, std::min(kLongestRun, width_ - left));
+      look_at(frame, &run);
+      for (int p = 0; p < run.count; ++p) row[left + p] = run.own[p] > most ? 255 : 0;
+    }
+    repeat_border(row);
   }
 }
 
@@ -150,6 +214,8 @@ void Decision::explain(const Comparison& frame, int grid_row) {
   const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
   for (int y = grid.top(grid_row); y < grid.top(grid_row + 1); ++y) {
     const uint8_t* const differing = differing_row(y);
+    uint8_t* const foreground = foreground_row(y);
+    std::memcpy(foreground, differing, static_cast<size_t>(width_));
     // Neighbouring cells are one span.
     for (int col = 0; col < grid.cols;) {
       const auto busy = [&](int at) {
@@ -165,7 +231,7 @@ void Decision::explain(const Comparison& frame, int grid_row) {
       while (col < grid.cols && busy(col)) ++col;
       explain_span(frame, y, grid_row, first, col);
     }
-    repeat_border(differing_row(y));
+    repeat_border(foreground);
   }
 }
 
@@ -185,19 +251,25 @@ void Decision::explain_span(const Comparison& frame, int y, int grid_row, int fi
     Run run(y, left, std::min((count + kRunUnit - 1) / kRunUnit * kRunUnit, width_ - left));
     look_at(frame, &run);
     if (sampled || moving) look_around(frame, &run);
-    uint8_t* const differing = differing_row(y) + left;
+    const uint8_t* const differing = differing_row(y) + left;
+    uint8_t* const foreground = foreground_row(y) + left;
+    uint16_t* const noise = noise_.row(y) + left;
     for (int p = 0; p < count;) {
       const int end = std::min(count, grid.left(col + 1) - left), size = end - p;
       const size_t cell = first_cell + static_cast<size_t>(col);
       if (sampled)
         texture_.add(cell, differing_pixels(differing + p, size),
                      explained_pixels(differing + p, run.own + p, run.nearest + p, size));
-      if (!(steps_.texture && texture_.moves(cell) && !frame.fixed)) {
-        keep_beyond(run.own + p, run.limit + p, size, differing + p);
+      if (moves(cell, frame)) {
+        uint8_t limit[kLongestRun], all[kLongestRun];
+        std::copy_n(run.limit + p, size, limit);
+        raise_limit(noise + p, kMeansOfTextures, size, limit);
+        keep_beyond(run.nearest + p, limit, size, foreground + p);
+        std::fill_n(all, size, uint8_t{255});
+        learn_noise(run.nearest + p, all, size, texture_.share(cell), noise + p);
       } else {
-        uint16_t* const noise = texture_.noise(y) + left + p;
-        leave_texture(run.nearest + p, noise, run.limit + p, size, differing + p);
-        texture_.learn(cell, run.nearest + p, size, noise);
+        if (!frame.fixed) raise_limit(noise + p, kMeanDistances, size, run.limit + p);
+        keep_beyond(run.own + p, run.limit + p, size, foreground + p);
       }
       p = end;
       if (left + end == grid.left(col + 1)) ++col;
@@ -207,20 +279,31 @@ void Decision::explain_span(const Comparison& frame, int y, int grid_row, int fi
   }
 }
 
+bool Decision::moves(size_t cell, const Comparison& frame) const {
+  return steps_.texture && !frame.fixed && texture_.moves(cell);
+}
+
 // Distances and limits of a run.
 void Decision::look_at(const Comparison& frame, Run* run) {
   const size_t first =
       static_cast<size_t>(run->y) * static_cast<size_t>(width_) + static_cast<size_t>(run->left);
-  const uint8_t* const x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
-  const uint8_t* const level[3] = {level_row(0, run->y) + run->left,
-                                   level_row(1, run->y) + run->left,
-                                   level_row(2, run->y) + run->left};
   const auto count = static_cast<size_t>(run->count);
-  squared_distance(x, level, count, run->own);
-  const auto least = static_cast<uint8_t>(std::min(255.0, frame.threshold));
+  if (noisy_) {
+    const Around<1, kLongestRun> around(*this, frame, run->y, run->left, run->count);
+    smoothed_distance(around.x, around.level, count, run->own);
+  } else {
+    const uint8_t* const x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
+    const uint8_t* const level[3] = {level_row(0, run->y) + run->left,
+                                     level_row(1, run->y) + run->left,
+                                     level_row(2, run->y) + run->left};
+    squared_distance(x, level, count, run->own);
+  }
+  const auto least = static_cast<uint8_t>(std::min(255.0, threshold_));
+  const int part = noisy_ ? 3 : 1;
   if (frame.limits)
-    std::transform(frame.limits + first, frame.limits + first + count, run->limit,
-                   [least](uint8_t limit) { return std::max(limit, least); });
+    std::transform(
+        frame.limits + first, frame.limits + first + count, run->limit,
+        [least, part](int limit) { return std::max(static_cast<uint8_t>(limit / part), least); });
   else
     std::fill_n(run->limit, count, least);
 }
@@ -240,32 +323,19 @@ void Decision::look_around(const Comparison& frame, Run* run) {
 
 // The first `count` pixels of a run.
 void Decision::leave_shadows(const Comparison& frame, const Run& run, int count) {
-  const auto most = static_cast<int>(kShadingRun);
-  for (int first = 0; first < count; first += most) {
-    const int left = run.left + first, size = std::min(most, count - first);
-    uint8_t* const differing = differing_row(run.y) + left;
-    if (!std::memchr(differing, 255, static_cast<size_t>(size))) continue;
-    uint8_t inside[3 * kShadingAlong][kShadingRun + 2 * kShadingReach];
-    const bool at_edge = left < kShadingReach || left + size + kShadingReach > width_;
-    const uint8_t *x[3 * kShadingAlong], *level[3 * kShadingAlong];
-    for (int c = 0; c < kChannels; ++c)
-      for (int i = 0; i < kShadingAlong; ++i) {
-        const int at = kShadingAlong * c + i;
-        const int y = std::clamp(run.y + i - kShadingReach, 0, height_ - 1);
-        level[at] = level_row(c, y) + left;
-        const uint8_t* const row =
-            frame.x[c] + static_cast<size_t>(y) * static_cast<size_t>(width_);
-        x[at] = row + left;
-        if (!at_edge) continue;
-        // The border's pixels stand for those outside.
-        for (int p = 0; p < size + 2 * kShadingReach; ++p)
-          inside[at][p] = row[std::clamp(left + p - kShadingReach, 0, width_ - 1)];
-        x[at] = inside[at] + kShadingReach;
-      }
-    uint8_t* const shaded =
+  constexpr auto kMost = static_cast<int>(kShadingRun);
+  for (int first = 0; first < count; first += kMost) {
+    const int left = run.left + first, size = std::min(kMost, count - first);
+    uint8_t* const foreground = foreground_row(run.y) + left;
+    if (!std::memchr(foreground, 255, static_cast<size_t>(size))) continue;
+    const Around<kShadingReach, kMost> around(*this, frame, run.y, left, size);
+    uint8_t shaded[kMost];
+    find_shaded(around.x, around.level, black_, around.differing, run.limit + first,
+                static_cast<size_t>(size), shaded);
+    uint8_t* const marks =
         shaded_.data() + static_cast<size_t>(run.y) * static_cast<size_t>(width_) + left;
-    find_shaded(x, level, black_, differing, run.limit + first, static_cast<size_t>(size), shaded);
-    take_out(shaded, size, differing);
+    for (int p = 0; p < size; ++p) marks[p] = shaded[p] & foreground[p];
+    take_out(shaded, size, foreground);
   }
 }
 
@@ -274,7 +344,7 @@ void Decision::vote(int first_row, int row_count) {
   uint8_t* out = mask_.data() + static_cast<size_t>(first_row) * width;
   if (reach_ == 0) {
     for (int y = first_row; y < first_row + row_count; ++y, out += width)
-      std::memcpy(out, differing_row(y), width);
+      std::memcpy(out, foreground_row(y), width);
     return;
   }
   constexpr int kRows = 2 * kMostReach + 1;
@@ -284,13 +354,56 @@ void Decision::vote(int first_row, int row_count) {
     int counted = std::max(0, first_row - reach_);
     for (int y = first_row; y < first_row + row_count; ++y) {
       for (const int end = std::min(height_, y + reach_ + 1); counted < end; ++counted)
-        count_columns(differing_row(counted) + left - reach_, count, reach_,
+        count_columns(foreground_row(counted) + left - reach_, count, reach_,
                       counts[counted % kRows]);
       const uint8_t* around[kRows];
       for (int i = 0; i <= 2 * reach_; ++i)
         around[i] = counts[std::clamp(y + i - reach_, 0, height_ - 1) % kRows];
-      vote_row(around, differing_row(y) + left, count, reach_,
+      vote_row(around, foreground_row(y) + left, count, reach_,
                mask_.data() + static_cast<size_t>(y) * width + left);
+    }
+  }
+}
+
+// The noise of pixels that are background, and not next to foreground.
+void Decision::learn(const Comparison& frame, int first_row, int row_count) {
+  const Grid& grid = texture_.grid();
+  const float share = 1 / static_cast<float>(std::min(frames_ / kNoiseRows + 1, kNoiseFrames));
+  int grid_row = 0;
+  for (int y = first_row; y < first_row + row_count; ++y) {
+    if ((y + frames_) % kNoiseRows != 0) continue;
+    while (grid.top(grid_row + 1) <= y) ++grid_row;
+    const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
+    const auto row_of = [&](int at) {
+      return mask_.data() +
+             static_cast<size_t>(std::clamp(at, 0, height_ - 1)) * static_cast<size_t>(width_);
+    };
+    const uint8_t* const rows[3] = {row_of(y - kNearForeground), row_of(y),
+                                    row_of(y + kNearForeground)};
+    int col = 0;
+    for (int left = 0; left < width_; left += kLongestRun) {
+      Run run(y, left, std::min(kLongestRun, width_ - left));
+      look_at(frame, &run);
+      uint16_t* const noise = noise_.row(y) + left;
+      raise_limit(noise, kMeanDistances, run.count, run.limit);
+      uint8_t column[kLongestRun + 2 * kNearForeground], learns[kLongestRun];
+      for (int p = 0; p < run.count + 2 * kNearForeground; ++p) {
+        const int at = std::clamp(left + p - kNearForeground, 0, width_ - 1);
+        column[p] = rows[0][at] | rows[1][at] | rows[2][at];
+      }
+      widen(column + kNearForeground, run.count, kNearForeground, learns);
+      for (int p = 0; p < run.count; ++p)
+        learns[p] = learns[p] == 0 && run.own[p] <= run.limit[p] * run.limit[p] ? 255 : 0;
+      // Textures that move have learnt already.
+      while (col < grid.cols && grid.left(col) < left + run.count) {
+        const int begin = std::max(grid.left(col), left) - left;
+        const int end = std::min(grid.left(col + 1), left + run.count) - left;
+        if (moves(first_cell + static_cast<size_t>(col), frame))
+          std::fill(learns + begin, learns + end, uint8_t{0});
+        if (grid.left(col + 1) > left + run.count) break;
+        ++col;
+      }
+      learn_noise(run.own, learns, run.count, share, noise);
     }
   }
 }

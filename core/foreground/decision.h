@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/foreground/moving_texture.h"
+#include "core/foreground/pixel_noise.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
 #include "core/parallel/pool.h"
@@ -31,18 +32,22 @@ struct Comparison {
 
 // Steps that can be left out, to see what they are worth (docs/masks.md); users have no say in it.
 struct DecisionSteps {
-  bool light = true;    // find_shaded
+  bool smooth = true;   // means of 3 x 3 pixels where there is much noise
+  bool noise = true;    // PixelNoise
   bool texture = true;  // MovingTexture
+  bool light = true;    // find_shaded
   bool vote = true;
 };
 
 // A pixel that differs from L is foreground unless
 //   - it is L in another light (find_shaded; see Shadows; not in grey pictures),
-//   - it is in a texture that moves (MovingTexture), and near to the background next to it or no
-//     further from L than it is all the time,
+//   - it is hardly further from L than it is all the time (PixelNoise),
+//   - it is in a texture that moves (MovingTexture), and as near as ever to the background next to
+//     it,
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
 //     foreground, too.
-// Learns from the frames that it decides, which come in the stream's order.
+// In much noise, means of 3 x 3 pixels are compared. Learns from the frames that it decides, which
+// come in the stream's order.
 class Decision {
  public:
   // Takes all memory. For frames of width x height pixels of these colours.
@@ -50,11 +55,11 @@ class Decision {
   static uint64_t bytes(int width, int height);
 
   // The next frame is of another stream.
-  void forget() { texture_.forget(); }
+  void forget();
   void set_shadows(Shadows shadows) { shadows_ = shadows; }
   Shadows shadows() const { return shadows_; }
   // True where no frame was decided since forget().
-  bool new_born() const { return texture_.new_born(); }
+  bool new_born() const { return frames_ == 0; }
 
   // Decides the next frame: what follows is about it. pool: or null. Results do not depend on it.
   void decide(const Comparison& frame, Pool* pool);
@@ -68,6 +73,8 @@ class Decision {
  private:
   // Pixels left .. left + count - 1 of a row.
   struct Run;
+  template <int kReach, int kMost>
+  struct Around;
 
   // Rows are `stride_` samples apart and have `margin_` samples more on both sides.
   size_t offset(int y) const {
@@ -75,13 +82,18 @@ class Decision {
   }
   uint8_t* level_row(int channel, int y) { return level_[channel].data() + offset(y); }
   uint8_t* differing_row(int y) { return differing_.data() + offset(y); }
+  uint8_t* foreground_row(int y) { return foreground_.data() + offset(y); }
+  bool moves(size_t cell, const Comparison& frame) const;
+  // Steps of a frame; threads have rows of their own.
   void compare(const Comparison& frame, int first_row, int row_count);
+  void compare_means(const Comparison& frame, int first_row, int row_count);
   void explain(const Comparison& frame, int grid_row);
   void explain_span(const Comparison& frame, int y, int grid_row, int first, int last);
   void look_at(const Comparison& frame, Run* run);
   void look_around(const Comparison& frame, Run* run);
   void leave_shadows(const Comparison& frame, const Run& run, int count);
   void vote(int first_row, int row_count);
+  void learn(const Comparison& frame, int first_row, int row_count);
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
 
@@ -93,7 +105,13 @@ class Decision {
   uint8_t black_[3] = {0, 0, 0};
   bool knows_light_;
   MovingTexture texture_;
-  std::vector<uint8_t> level_[3], differing_, mask_, shaded_;
+  PixelNoise noise_;
+  int frames_ = 0;
+  // Of the frame: means are compared, and what they must exceed.
+  bool noisy_ = false;
+  double threshold_ = 0;
+  // Of the frame: L, what differs from it, and what is foreground before and after the vote.
+  std::vector<uint8_t> level_[3], differing_, foreground_, mask_, shaded_;
 };
 
 // A pixel of a mask is overruled where three fifths of those at most so many rows and columns from

@@ -1,7 +1,6 @@
 #include "core/foreground/moving_texture.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace qdmd {
 namespace {
@@ -20,26 +19,21 @@ constexpr int kFirstFrames = 25;
 // A cell moves above these: share of pixels that differ, share of these that are explained, least
 // share of pixels that differ by their average share. docs/masks.md has others.
 constexpr float kDiffering = 0.02f, kExplained = 0.3f, kAlways = 0.5f;
-// What moves differs by up to this, in levels.
-constexpr float kMost = 100;
 
 }  // namespace
 
 MovingTexture::MovingTexture(int width, int height)
     : grid_(width, height, kTextureCells),
       row_step_(std::max(1, height / grid_.rows / kSampledRows)),
-      cells_(grid_.cells()),
-      noise_(static_cast<size_t>(width) * static_cast<size_t>(height)) {}
+      cells_(grid_.cells()) {}
 
 uint64_t MovingTexture::bytes(int width, int height) {
-  return uint64_t{sizeof(uint16_t)} * static_cast<uint64_t>(width) * static_cast<uint64_t>(height) +
-         Grid(width, height, kTextureCells).cells() * sizeof(Cell);
+  return Grid(width, height, kTextureCells).cells() * sizeof(Cell);
 }
 
 void MovingTexture::forget() {
   frames_ = 0;
   std::fill(cells_.begin(), cells_.end(), Cell());
-  std::fill(noise_.begin(), noise_.end(), uint16_t{0});
 }
 
 float MovingTexture::sampled_pixels(int row, int col) const {
@@ -83,16 +77,6 @@ void MovingTexture::end_frame() {
       cell.moved += cell.moves;
     }
   ++frames_;
-}
-
-void MovingTexture::learn(size_t cell, const uint16_t* squared, int count, uint16_t* noise) const {
-  // The mean of all frames, later of about the last 50.
-  const float share = 1 / static_cast<float>(std::min(cells_[cell].moved, 50));
-  for (int p = 0; p < count; ++p) {
-    const float level = std::min(std::sqrt(static_cast<float>(squared[p])), kMost);
-    const auto known = static_cast<float>(noise[p]);
-    noise[p] = static_cast<uint16_t>(known + share * (256 * level - known) + 0.5f);
-  }
 }
 
 }  // namespace qdmd

@@ -1,6 +1,7 @@
 // Where the background moves by itself: leaves, water, edges before a camera that shakes.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -22,9 +23,6 @@ class MovingTexture {
   const Grid& grid() const { return grid_; }
   // Begins afresh.
   void forget();
-  // True until the first end_frame().
-  bool new_born() const { return frames_ == 0; }
-
   // True where the cell moves.
   bool moves(size_t cell) const { return cells_[cell].moves; }
   // Rows that are looked at: a few of each cell say enough.
@@ -38,13 +36,10 @@ class MovingTexture {
   // After the last cell of a frame.
   void end_frame();
 
-  // Of a row of pixels in cells that move: how far they are on average from the nearest background
-  // around, in 1/256 level. What is known elsewhere is of no use.
-  uint16_t* noise(int y) {
-    return noise_.data() + static_cast<size_t>(y) * static_cast<size_t>(grid_.width);
+  // Of the frames in which the cell moved, what the newest one counts in means.
+  float share(size_t cell) const {
+    return 1 / static_cast<float>(std::clamp(cells_[cell].moved, 1, 50));
   }
-  // Learns `count` pixels of a cell, squared distances in levels.
-  void learn(size_t cell, const uint16_t* squared, int count, uint16_t* noise) const;
 
  private:
   struct Cell {
@@ -61,7 +56,6 @@ class MovingTexture {
   int row_step_;
   int frames_ = 0;
   std::vector<Cell> cells_;
-  std::vector<uint16_t> noise_;
 };
 
 }  // namespace qdmd

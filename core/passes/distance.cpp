@@ -54,6 +54,33 @@ void nearest_of(const uint8_t* const* x, const uint8_t* const* rows, int rows_al
   nearest(hn::CappedTag<uint16_t, 1>(), x, rows, rows_along, reach, step, p, count, out);
 }
 
+// A plain loop, which the compiler makes vectors of for each instruction set.
+void smoothed(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+              uint16_t* HWY_RESTRICT out) {
+  constexpr size_t kRun = 256;
+  for (size_t first = 0; first < count; first += kRun) {
+    const size_t size = count - first < kRun ? count - first : kRun;
+    float sums[kRun] = {};
+    for (size_t c = 0; c < 3; ++c) {
+      int columns[kRun + 2];
+      const uint8_t *a = x[3 * c] + first - 1, *b = x[3 * c + 1] + first - 1,
+                    *e = x[3 * c + 2] + first - 1;
+      const uint8_t *f = l[3 * c] + first - 1, *g = l[3 * c + 1] + first - 1,
+                    *h = l[3 * c + 2] + first - 1;
+      for (size_t p = 0; p < size + 2; ++p) columns[p] = a[p] + b[p] + e[p] - f[p] - g[p] - h[p];
+      for (size_t p = 0; p < size; ++p) {
+        const auto sum = static_cast<float>(columns[p] + columns[p + 1] + columns[p + 2]);
+        sums[p] += sum * sum;
+      }
+    }
+    // Of the means, rounded to the nearest.
+    for (size_t p = 0; p < size; ++p) {
+      const float squared = sums[p] * (1.0f / 81) + 0.5f;
+      out[first + p] = static_cast<uint16_t>(squared < 65535 ? static_cast<int>(squared) : 65535);
+    }
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace qdmd
 HWY_AFTER_NAMESPACE();
@@ -62,6 +89,7 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 
 HWY_EXPORT(nearest_of);
+HWY_EXPORT(smoothed);
 
 void squared_distance(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
                       uint16_t* out) {
@@ -71,6 +99,11 @@ void squared_distance(const uint8_t* const x[3], const uint8_t* const l[3], size
 void nearest_distance(const uint8_t* const x[3], const uint8_t* const* rows, size_t count, int step,
                       uint16_t* out) {
   HWY_DYNAMIC_DISPATCH(nearest_of)(x, rows, kPlacesAlong, kPlaces, step, count, out);
+}
+
+void smoothed_distance(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+                       uint16_t* out) {
+  HWY_DYNAMIC_DISPATCH(smoothed)(x, l, count, out);
 }
 
 }  // namespace qdmd

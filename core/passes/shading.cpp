@@ -13,9 +13,9 @@ namespace {
 
 constexpr int kWhole = static_cast<int>(kShadingRun) + 2 * kShadingReach;
 
-// <x, L>, <L, L> and <x, x> of columns of pixels.
+// <x, L>, <L, L>, <x, x> and the number of pixels that differ in columns.
 struct Products {
-  alignas(64) int32_t xl[kWhole], ll[kWhole], xx[kWhole];
+  alignas(64) int32_t xl[kWhole], ll[kWhole], xx[kWhole], count[kWhole];
 };
 
 }  // namespace
@@ -50,26 +50,31 @@ bool shaded_alone(const uint8_t* const* x, const uint8_t* const* l, const uint8_
   return any != 0;
 }
 
-// Takes out of `out` where the pixels around have another texture. Sums of 25 products are below
-// 2^23, which floats hold; the products of two such sums lose less than 0.02 squared levels.
+// Takes out of `out` where the pixels around that differ have another texture. Sums of 25 products
+// are below 2^23, which floats hold; the products of two such sums lose less than 0.02 squared
+// levels.
 void alike_around(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
-                  const uint8_t* HWY_RESTRICT limit, int count, uint8_t* HWY_RESTRICT out) {
+                  const uint8_t* const* differing, const uint8_t* HWY_RESTRICT limit, int count,
+                  uint8_t* HWY_RESTRICT out) {
   const int whole = count + 2 * kShadingReach;
   const int red = black[0], green = black[1], blue = black[2];
   Products columns;
   std::fill_n(columns.xl, whole, 0), std::fill_n(columns.ll, whole, 0);
-  std::fill_n(columns.xx, whole, 0);
+  std::fill_n(columns.xx, whole, 0), std::fill_n(columns.count, whole, 0);
   for (int row = 0; row < kShadingAlong; ++row) {
     const uint8_t *xr = x[row] - kShadingReach, *xg = x[kShadingAlong + row] - kShadingReach,
                   *xb = x[2 * kShadingAlong + row] - kShadingReach;
     const uint8_t *lr = l[row] - kShadingReach, *lg = l[kShadingAlong + row] - kShadingReach,
                   *lb = l[2 * kShadingAlong + row] - kShadingReach;
+    const uint8_t* mask = differing[row] - kShadingReach;
     for (int p = 0; p < whole; ++p) {
       const int r = xr[p] - red, g = xg[p] - green, b = xb[p] - blue;
       const int lit_r = lr[p] - red, lit_g = lg[p] - green, lit_b = lb[p] - blue;
-      columns.xl[p] += r * lit_r + g * lit_g + b * lit_b;
-      columns.ll[p] += lit_r * lit_r + lit_g * lit_g + lit_b * lit_b;
-      columns.xx[p] += r * r + g * g + b * b;
+      const int differs = -(mask[p] & 1);
+      columns.xl[p] += differs & (r * lit_r + g * lit_g + b * lit_b);
+      columns.ll[p] += differs & (lit_r * lit_r + lit_g * lit_g + lit_b * lit_b);
+      columns.xx[p] += differs & (r * r + g * g + b * b);
+      columns.count[p] -= differs;
     }
   }
   const auto around = [](const int32_t* column) {
@@ -78,17 +83,18 @@ void alike_around(const uint8_t* const* x, const uint8_t* const* l, const uint8_
   for (int p = 0; p < count; ++p) {
     const auto a = static_cast<float>(around(columns.xl + p)),
                b = static_cast<float>(around(columns.ll + p)),
-               c = static_cast<float>(around(columns.xx + p));
+               c = static_cast<float>(around(columns.xx + p)),
+               n = static_cast<float>(around(columns.count + p));
     const float own = limit[p], most = std::max(144.0f, 9 * own * own);
-    const bool alike = 16 * (c * b - a * a) <= most * (kShadingAlong * kShadingAlong) * b;
+    const bool alike = 16 * (c * b - a * a) <= most * n * b;
     out[p] = alike ? out[p] : 0;
   }
 }
 
 void shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
-            const uint8_t* differing, const uint8_t* limit, int count, uint8_t* out) {
-  if (shaded_alone(x, l, black, differing, limit, count, out))
-    alike_around(x, l, black, limit, count, out);
+            const uint8_t* const* differing, const uint8_t* limit, int count, uint8_t* out) {
+  if (shaded_alone(x, l, black, differing[kShadingReach], limit, count, out))
+    alike_around(x, l, black, differing, limit, count, out);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -101,7 +107,8 @@ namespace qdmd {
 HWY_EXPORT(shaded);
 
 void find_shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
-                 const uint8_t* differing, const uint8_t* limit, size_t count, uint8_t* out) {
+                 const uint8_t* const* differing, const uint8_t* limit, size_t count,
+                 uint8_t* out) {
   HWY_DYNAMIC_DISPATCH(shaded)(x, l, black, differing, limit, static_cast<int>(count), out);
 }
 

@@ -77,9 +77,11 @@ TEST(Shading, FollowsItsDefinition) {
             x.at[row][i - kShadingReach] = static_cast<uint8_t>(
                 std::clamp(lit + static_cast<double>(rng() % 9) - 4, 0.0, 255.0));
           }
-        BeforeTheEdge<uint8_t> differing(count), limit(count), out(count);
+        Rows differing(kShadingAlong, count, kShadingReach, rng);
+        for (auto& row : differing.memory)
+          for (uint8_t& sample : *row) sample = sample % 4 ? 255 : 0;
+        BeforeTheEdge<uint8_t> limit(count), out(count);
         for (size_t p = 0; p < count; ++p) {
-          differing[p] = rng() % 4 ? 255 : 0;
           limit[p] = static_cast<uint8_t>(rng() % 3 ? 4 + rng() % 20 : rng() % 256);
         }
         find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), count,
@@ -87,18 +89,22 @@ TEST(Shading, FollowsItsDefinition) {
         for (int p = 0; p < static_cast<int>(count); ++p) {
           // <x, L>, <L, L>, <x, x> of the pixel, and of those around.
           double own[3] = {}, around[3] = {};
+          int pixels = 0;
           for (int row = 0; row < kShadingAlong; ++row)
-            for (int col = -kShadingReach; col <= kShadingReach; ++col)
+            for (int col = -kShadingReach; col <= kShadingReach; ++col) {
+              const bool differs = differing.at[size_t(row)][p + col] != 0;
+              pixels += differs;
               for (int c = 0; c < 3; ++c) {
                 const auto at = static_cast<size_t>(c * kShadingAlong + row);
                 const double a = x.at[at][p + col] - black[size_t(c)];
                 const double b = l.at[at][p + col] - black[size_t(c)];
                 const double products[3] = {a * b, b * b, a * a};
                 for (int k = 0; k < 3; ++k) {
-                  around[k] += products[k] / (kShadingAlong * kShadingAlong);
+                  if (differs) around[k] += products[k];
                   if (row == kShadingReach && col == 0) own[k] += products[k];
                 }
               }
+            }
           const auto rest = [](const double sums[3]) {
             return sums[2] - sums[0] * sums[0] / sums[1];
           };
@@ -107,10 +113,12 @@ TEST(Shading, FollowsItsDefinition) {
           const double texture = std::max(3.0, 0.75 * limit[size_t(p)]);
           // What floats round away decides nothing here.
           if (std::abs(rest(own) - most * most) < 0.05 || std::abs(a - 0.5) < 1e-5 ||
-              std::abs(rest(around) - texture * texture) < 0.05 || std::abs(a - 1.15) < 1e-5)
+              std::abs(rest(around) / pixels - texture * texture) < 0.05 ||
+              std::abs(a - 1.15) < 1e-5)
             continue;
-          const bool expected = differing[size_t(p)] && own[1] > 0 && a >= 0.5 && a <= 1.15 &&
-                                rest(own) <= most * most && rest(around) <= texture * texture;
+          const bool expected = differing.at[kShadingReach][p] && own[1] > 0 && a >= 0.5 &&
+                                a <= 1.15 && rest(own) <= most * most &&
+                                rest(around) <= pixels * texture * texture;
           ++(expected ? shaded : others);
           ASSERT_EQ(out[size_t(p)], expected ? 255 : 0) << p << " of " << count;
         }
@@ -262,7 +270,7 @@ TEST(MovingTexture, IsNoForeground) {
   std::mt19937 rng(323);
   Planes leaves = leaves_of(320, 240, rng);
   for (bool known : {true, false}) {
-    Decided decided(leaves, {true, known, true});
+    Decided decided(leaves, {true, true, known, true, true});
     size_t false_positives = 0, hits = 0;
     for (int t = 0; t < 200; ++t) {
       Planes frame = in_wind(leaves, 200, rng);
