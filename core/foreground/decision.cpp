@@ -55,8 +55,13 @@ void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restr
   for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
 }
 
-void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask) {
-  for (int p = 0; p < count; ++p) mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
+// Moves what is set in `what` from the mask to `taken`.
+void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask,
+              uint8_t* __restrict taken) {
+  for (int p = 0; p < count; ++p) {
+    taken[p] = what[p] & mask[p];
+    mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
+  }
 }
 
 }  // namespace
@@ -334,8 +339,7 @@ void Decision::leave_shadows(const Comparison& frame, const Run& run, int count)
                 static_cast<size_t>(size), shaded);
     uint8_t* const marks =
         shaded_.data() + static_cast<size_t>(run.y) * static_cast<size_t>(width_) + left;
-    for (int p = 0; p < size; ++p) marks[p] = shaded[p] & foreground[p];
-    take_out(shaded, size, foreground);
+    take_out(shaded, size, foreground, marks);
   }
 }
 

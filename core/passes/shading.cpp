@@ -50,6 +50,23 @@ bool shaded_alone(const uint8_t* const* x, const uint8_t* const* l, const uint8_
   return any != 0;
 }
 
+void add_row(const uint8_t* HWY_RESTRICT xr, const uint8_t* HWY_RESTRICT xg,
+             const uint8_t* HWY_RESTRICT xb, const uint8_t* HWY_RESTRICT lr,
+             const uint8_t* HWY_RESTRICT lg, const uint8_t* HWY_RESTRICT lb,
+             const uint8_t* HWY_RESTRICT mask, const uint8_t* black, int count,
+             Products* HWY_RESTRICT columns) {
+  const int red = black[0], green = black[1], blue = black[2];
+  for (int p = 0; p < count; ++p) {
+    const int r = xr[p] - red, g = xg[p] - green, b = xb[p] - blue;
+    const int lit_r = lr[p] - red, lit_g = lg[p] - green, lit_b = lb[p] - blue;
+    const int differs = -(mask[p] & 1);
+    columns->xl[p] += differs & (r * lit_r + g * lit_g + b * lit_b);
+    columns->ll[p] += differs & (lit_r * lit_r + lit_g * lit_g + lit_b * lit_b);
+    columns->xx[p] += differs & (r * r + g * g + b * b);
+    columns->count[p] -= differs;
+  }
+}
+
 // Takes out of `out` where the pixels around that differ have another texture. Sums of 25 products
 // are below 2^23, which floats hold; the products of two such sums lose less than 0.02 squared
 // levels.
@@ -57,25 +74,21 @@ void alike_around(const uint8_t* const* x, const uint8_t* const* l, const uint8_
                   const uint8_t* const* differing, const uint8_t* HWY_RESTRICT limit, int count,
                   uint8_t* HWY_RESTRICT out) {
   const int whole = count + 2 * kShadingReach;
-  const int red = black[0], green = black[1], blue = black[2];
   Products columns;
   std::fill_n(columns.xl, whole, 0), std::fill_n(columns.ll, whole, 0);
   std::fill_n(columns.xx, whole, 0), std::fill_n(columns.count, whole, 0);
   for (int row = 0; row < kShadingAlong; ++row) {
-    const uint8_t *xr = x[row] - kShadingReach, *xg = x[kShadingAlong + row] - kShadingReach,
-                  *xb = x[2 * kShadingAlong + row] - kShadingReach;
-    const uint8_t *lr = l[row] - kShadingReach, *lg = l[kShadingAlong + row] - kShadingReach,
-                  *lb = l[2 * kShadingAlong + row] - kShadingReach;
-    const uint8_t* mask = differing[row] - kShadingReach;
-    for (int p = 0; p < whole; ++p) {
-      const int r = xr[p] - red, g = xg[p] - green, b = xb[p] - blue;
-      const int lit_r = lr[p] - red, lit_g = lg[p] - green, lit_b = lb[p] - blue;
-      const int differs = -(mask[p] & 1);
-      columns.xl[p] += differs & (r * lit_r + g * lit_g + b * lit_b);
-      columns.ll[p] += differs & (lit_r * lit_r + lit_g * lit_g + lit_b * lit_b);
-      columns.xx[p] += differs & (r * r + g * g + b * b);
-      columns.count[p] -= differs;
-    }
+    const auto add = [&](int size) HWY_ATTR {
+      add_row(x[row] - kShadingReach, x[kShadingAlong + row] - kShadingReach,
+              x[2 * kShadingAlong + row] - kShadingReach, l[row] - kShadingReach,
+              l[kShadingAlong + row] - kShadingReach, l[2 * kShadingAlong + row] - kShadingReach,
+              differing[row] - kShadingReach, black, size, &columns);
+    };
+    // No loop for what is left of vectors where there is nothing left.
+    if (whole == kWhole)
+      add(kWhole);
+    else
+      add(whole);
   }
   const auto around = [](const int32_t* column) {
     return column[0] + column[1] + column[2] + column[3] + column[4];

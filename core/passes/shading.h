@@ -10,8 +10,8 @@ namespace qdmd {
 constexpr int kShadingReach = 2, kShadingAlong = 2 * kShadingReach + 1;
 
 // Pixels that are looked at together, at most: short runs, because what is around is looked at only
-// where one of them may be shaded.
-constexpr size_t kShadingRun = 32;
+// where one of them may be shaded; with what is around, whole vectors.
+constexpr size_t kShadingRun = 32 - 2 * kShadingReach;
 
 // out[p] = 255 where the pixel differs and x = a L + rest with a = <x, L> / <L, L> in 0.5 .. 1.15,
 // where |rest| is at most half of the pixel's limit, and where one gain for the pixels around that
