@@ -18,9 +18,9 @@ namespace {
 constexpr size_t kPixelsPerPart = 65536;
 // A pixel that is explained: another is nearer than this share of its own distance, squared.
 constexpr uint32_t kNearer = 9, kNearerOf = 100;
-// Above so many mean distances, in 1/256, a pixel is foreground. Of Gaussian noise, 4.3 are the
-// 4 sqrt(3) sigma of automatic_threshold(). Leaves are further from what is around now and then.
-constexpr int kMeanDistances = 1101, kMeansOfTextures = 1536;
+// Above so many mean distances, in 1/256, a pixel is foreground. Of Gaussian noise, 3.5 are 5.6
+// sigma. Leaves are further from what is around now and then.
+constexpr int kMeanDistances = 896, kMeansOfTextures = 1536;
 // Every so manieth row of a frame tells how far its pixels are from L, other rows of each frame;
 // each of them counts at least 1 / kNoiseFrames.
 constexpr int kNoiseRows = 4, kNoiseFrames = 16;
@@ -29,6 +29,8 @@ constexpr int kNearForeground = 4;
 // Where noise alone asks for a threshold above this, in levels, means of 3 x 3 pixels are compared:
 // their noise is a third.
 constexpr double kNoisy = 36, kLeastOfMeans = 18;
+// Parts of the mask below these shares of the picture are specks, and holes.
+constexpr size_t kLeastForeground = 5000, kLeastHole = 500;
 // Runs end at multiples of it where the row goes on: no vector is begun for a few pixels.
 constexpr int kRunUnit = 32, kLongestRun = 256;
 
@@ -118,6 +120,7 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
       steps_(steps),
       texture_(width, height),
       noise_(width, height),
+      specks_(width, height),
       differing_(stride_ * static_cast<size_t>(height)),
       foreground_(differing_.size()),
       mask_(static_cast<size_t>(width) * static_cast<size_t>(height)),
@@ -133,7 +136,7 @@ uint64_t Decision::bytes(int width, int height) {
       static_cast<uint64_t>(2 * kPlaces * std::max(1, std::min(width, height) / 240));
   const auto pixels = static_cast<uint64_t>(width) * rows;
   return 5 * (pixels + margin * rows) + 2 * pixels + MovingTexture::bytes(width, height) +
-         PixelNoise::bytes(width, height);
+         PixelNoise::bytes(width, height) + Specks::bytes(width, height);
 }
 
 void Decision::forget() {
@@ -170,6 +173,10 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   });
   texture_.end_frame();
   in_bands(height_, parts, [&](int first, int size) { vote(first, size); });
+  if (steps_.specks && reach_ > 0) {
+    specks_.take_out(mask_.data(), 255, pixels / kLeastForeground, true);
+    specks_.take_out(mask_.data(), 0, pixels / kLeastHole, false);
+  }
   if (steps_.noise && !frame.fixed)
     in_bands(height_, parts, [&](int first, int size) { learn(frame, first, size); });
   ++frames_;

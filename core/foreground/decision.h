@@ -7,6 +7,7 @@
 
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
+#include "core/foreground/specks.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
 #include "core/parallel/pool.h"
@@ -37,6 +38,7 @@ struct DecisionSteps {
   bool texture = true;  // MovingTexture
   bool light = true;    // find_shaded
   bool vote = true;
+  bool specks = true;  // Specks; only after a vote
 };
 
 // A pixel that differs from L is foreground unless
@@ -45,7 +47,8 @@ struct DecisionSteps {
 //   - it is in a texture that moves (MovingTexture), and as near as ever to the background next to
 //     it,
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
-//     foreground, too.
+//     foreground, too,
+//   - it belongs to a part that is too small; holes that are too small are foreground (Specks).
 // In much noise, means of 3 x 3 pixels are compared. Learns from the frames that it decides, which
 // come in the stream's order.
 class Decision {
@@ -106,6 +109,7 @@ class Decision {
   bool knows_light_;
   MovingTexture texture_;
   PixelNoise noise_;
+  Specks specks_;
   int frames_ = 0;
   // Of the frame: means are compared, and what they must exceed.
   bool noisy_ = false;

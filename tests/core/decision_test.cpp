@@ -128,6 +128,61 @@ TEST(Shading, FollowsItsDefinition) {
   EXPECT_GT(others, 50u);
 }
 
+TEST(Specks, AreCountedByFlooding) {
+  std::mt19937 rng(329);
+  for (auto [width, height] : {std::pair{1, 1}, {40, 30}, {300, 3}, {2, 200}, {97, 64}})
+    for (int share : {3, 50, 90})
+      for (bool diagonal : {false, true})
+        for (uint8_t colour : {uint8_t{255}, uint8_t{0}}) {
+          // Squares of 10 pixels, so that there are runs for every 16 pixels at most.
+          const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+          std::vector<uint8_t> mask(pixels), squares(10000);
+          for (uint8_t& square : squares) square = rng() % 100 < unsigned(share) ? 255 : 0;
+          for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x)
+              mask[size_t(y * width + x)] = squares[size_t(y / 10 * 100 + x / 10)];
+          for (size_t least : {0u, 110u, 350u, 100000u}) {
+            auto expected = mask;
+            std::vector<uint8_t> seen(pixels);
+            for (size_t start = 0; start < pixels; ++start) {
+              if (seen[start] || mask[start] != colour) continue;
+              std::vector<size_t> part = {start};
+              seen[start] = 1;
+              for (size_t i = 0; i < part.size(); ++i)
+                for (int dy = -1; dy <= 1; ++dy)
+                  for (int dx = -1; dx <= 1; ++dx) {
+                    const int x = static_cast<int>(part[i]) % width + dx;
+                    const int y = static_cast<int>(part[i]) / width + dy;
+                    if ((dx != 0 && dy != 0 && !diagonal) || x < 0 || y < 0 || x >= width ||
+                        y >= height)
+                      continue;
+                    const auto at = static_cast<size_t>(y * width + x);
+                    if (seen[at] || mask[at] != colour) continue;
+                    seen[at] = 1;
+                    part.push_back(at);
+                  }
+              if (part.size() < least)
+                for (size_t at : part) expected[at] = static_cast<uint8_t>(~colour);
+            }
+            auto cleaned = mask;
+            Specks specks(width, height);
+            if (!specks.take_out(cleaned.data(), colour, least, diagonal)) {
+              EXPECT_LT(width, 20) << "rows of a few pixels have many runs";
+              continue;
+            }
+            ASSERT_EQ(cleaned, expected) << width << "x" << height << " " << share;
+          }
+        }
+}
+
+TEST(Specks, OfNoiseStay) {
+  std::vector<uint8_t> mask(100 * 100);
+  for (size_t p = 0; p < mask.size(); p += 2) mask[p] = 255;
+  auto same = mask;
+  EXPECT_FALSE(Specks(100, 100).take_out(same.data(), 255, 20, false));
+  EXPECT_EQ(same, mask);
+}
+
 // ---- Decisions ----
 
 // Planes of a picture.
@@ -270,7 +325,7 @@ TEST(MovingTexture, IsNoForeground) {
   std::mt19937 rng(323);
   Planes leaves = leaves_of(320, 240, rng);
   for (bool known : {true, false}) {
-    Decided decided(leaves, {true, true, known, true, true});
+    Decided decided(leaves, {true, true, known, true, true, true});
     size_t false_positives = 0, hits = 0;
     for (int t = 0; t < 200; ++t) {
       Planes frame = in_wind(leaves, 200, rng);

@@ -108,7 +108,7 @@ inline EngineOptions window_of(int size) {
 
 // The same, with masks in which each pixel decides by itself.
 inline EngineOptions with_pixels_alone(EngineOptions options) {
-  options.steps = {false, false, false, false, false};
+  options.steps = {false, false, false, false, false, false};
   return options;
 }
 

@@ -95,7 +95,7 @@ std::vector<std::vector<uint8_t>> pictures(const std::vector<std::vector<uint8_t
   auto options = window_of(static_cast<int>(frames.size()));
   options.dmd.rank = 1;
   options.foreground_threshold = 21;
-  options.steps = {false, false, false, false, true};
+  options.steps = {false, false, false, false, true, false};
   options.threads = threads;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, width, height).ok());

@@ -1,0 +1,75 @@
+#include "core/foreground/specks.h"
+
+#include <cstring>
+
+namespace qdmd {
+namespace {
+
+size_t most_runs(int width, int height) {
+  return static_cast<size_t>(width) * static_cast<size_t>(height) / 16 + 1;
+}
+
+// The first of count samples from `from` on that is `colour`, or count.
+int find(const uint8_t* row, int from, int count, uint8_t colour) {
+  const void* found = std::memchr(row + from, colour, static_cast<size_t>(count - from));
+  return found ? static_cast<int>(static_cast<const uint8_t*>(found) - row) : count;
+}
+
+}  // namespace
+
+Specks::Specks(int width, int height)
+    : width_(static_cast<size_t>(width)),
+      height_(static_cast<size_t>(height)),
+      most_runs_(most_runs(width, height)),
+      rows_(height_ + 1) {
+  runs_.reserve(most_runs_);
+}
+
+uint64_t Specks::bytes(int width, int height) {
+  return most_runs(width, height) * sizeof(Run) +
+         (static_cast<uint64_t>(height) + 1) * sizeof(uint32_t);
+}
+
+uint32_t Specks::part_of(uint32_t run) {
+  while (runs_[run].part != run) {
+    // Halves the way for the next who asks.
+    runs_[run].part = runs_[runs_[run].part].part;
+    run = runs_[run].part;
+  }
+  return run;
+}
+
+bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal) {
+  const auto other = static_cast<uint8_t>(~colour);
+  const int width = static_cast<int>(width_), corner = diagonal ? 1 : 0;
+  runs_.clear();
+  for (size_t y = 0; y < height_; ++y) {
+    rows_[y] = static_cast<uint32_t>(runs_.size());
+    const uint8_t* const row = mask + y * width_;
+    uint32_t above = y > 0 ? rows_[y - 1] : rows_[y];
+    for (int at = find(row, 0, width, colour); at < width;) {
+      const int end = find(row, at, width, other);
+      if (runs_.size() == most_runs_) return false;
+      const auto run = static_cast<uint32_t>(runs_.size());
+      runs_.push_back({at, end, run, static_cast<uint32_t>(end - at)});
+      // Runs of the row above that it touches. The last of them may touch the next one, too.
+      while (above < rows_[y] && runs_[above].end + corner <= at) ++above;
+      for (uint32_t i = above; i < rows_[y] && runs_[i].begin < end + corner; ++i) {
+        const uint32_t a = part_of(i), b = part_of(run);
+        if (a == b) continue;
+        runs_[a].area += runs_[b].area;
+        runs_[b].part = a;
+      }
+      at = end < width ? find(row, end, width, colour) : width;
+    }
+  }
+  rows_[height_] = static_cast<uint32_t>(runs_.size());
+  for (size_t y = 0; y < height_; ++y)
+    for (uint32_t i = rows_[y]; i < rows_[y + 1]; ++i)
+      if (runs_[part_of(i)].area < least)
+        std::memset(mask + y * width_ + runs_[i].begin, other,
+                    static_cast<size_t>(runs_[i].end - runs_[i].begin));
+  return true;
+}
+
+}  // namespace qdmd
