@@ -27,8 +27,8 @@ constexpr int kNoiseRows = 4, kNoiseFrames = 16;
 // Pixels at most so far from foreground say nothing of noise.
 constexpr int kNearForeground = 4;
 // Where noise alone asks for a threshold above this, in levels, means of 3 x 3 pixels are compared:
-// their noise is a third.
-constexpr double kNoisy = 36, kLeastOfMeans = 18;
+// their noise is a third. The pixel itself must exceed a share of the threshold.
+constexpr double kNoisy = 36, kLeastOfMeans = 18, kLeastAlone = 0.5;
 // Parts of the mask below these shares of the picture are specks, and holes.
 constexpr size_t kLeastForeground = 5000, kLeastHole = 500;
 // Runs end at multiples of it where the row goes on: no vector is begun for a few pixels.
@@ -203,12 +203,21 @@ void Decision::compare(const Comparison& frame, int first_row, int row_count) {
 // Which means differ.
 void Decision::compare_means(const Comparison& frame, int first_row, int row_count) {
   const auto most = static_cast<int>(threshold_ * threshold_);
+  const auto alone =
+      static_cast<int>(kLeastAlone * kLeastAlone * frame.threshold * frame.threshold);
   for (int y = first_row; y < first_row + row_count; ++y) {
     uint8_t* const row = differing_row(y);
     for (int left = 0; left < width_; left += kLongestRun) {
       Run run(y, left, std::min(kLongestRun, width_ - left));
       look_at(frame, &run);
-      for (int p = 0; p < run.count; ++p) row[left + p] = run.own[p] > most ? 255 : 0;
+      const size_t first = static_cast<size_t>(y) * static_cast<size_t>(width_) + left;
+      const uint8_t* const x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
+      const uint8_t* const level[3] = {level_row(0, y) + left, level_row(1, y) + left,
+                                       level_row(2, y) + left};
+      // Pixels next to something differ in their means, but not by themselves.
+      squared_distance(x, level, static_cast<size_t>(run.count), run.nearest);
+      for (int p = 0; p < run.count; ++p)
+        row[left + p] = run.own[p] > most && run.nearest[p] > alone ? 255 : 0;
     }
     repeat_border(row);
   }
