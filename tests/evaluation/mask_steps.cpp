@@ -169,8 +169,10 @@ int main(int argc, char** argv) try {
   std::vector<std::string> datasets, only;
   std::string sheet;
   std::vector<size_t> shown = {50};
+  bool plain = false;
   app.add_option("--dataset", datasets, "folder of sequences; again for more")->required();
   app.add_option("--only", only, "variants whose names begin so")->delimiter(',');
+  app.add_flag("--plain", plain, "only what is as it is");
   app.add_option(
       "--sheet", sheet,
       "no table: writes frames, masks of pixels by themselves and the default's masks of "
@@ -189,11 +191,15 @@ int main(int argc, char** argv) try {
   }
 
   std::vector<Variant> chosen;
-  for (const Variant& variant : variants())
-    if (only.empty() || std::any_of(only.begin(), only.end(), [&](const std::string& start) {
+  for (const Variant& variant : variants()) {
+    const bool as_it_is = variant.name.find(" without ") == std::string::npos &&
+                          variant.name.find(',') == std::string::npos;
+    const bool asked =
+        only.empty() || std::any_of(only.begin(), only.end(), [&](const std::string& start) {
           return variant.name.starts_with(start);
-        }))
-      chosen.push_back(variant);
+        });
+    if (asked && (as_it_is || !plain)) chosen.push_back(variant);
+  }
   std::vector<std::vector<double>> scores(chosen.size());
   for (size_t s = 0; s < sequences.size(); ++s) {
     const Clip clip = read_clip(sequences[s], {});

@@ -34,7 +34,7 @@ for scene in $scenes; do
   echo "101 400" >"$folder/gt/temporalROI.txt"
 done
 build/tests/evaluation/qdmd-mask-steps --dataset "$results/scenes" \
-  --only "default,mode=live,OpenCV MOG2,OpenCV KNN" --plain >"$results/scenes.md"
+  --plain --only "default,mode=live,OpenCV MOG2,OpenCV KNN" >"$results/scenes.md"
 
 echo "== cost" >&2
 build/tests/bench/passes --benchmark_filter='decide' --benchmark_format=json \
