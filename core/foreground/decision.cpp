@@ -7,6 +7,7 @@
 #include "core/passes/bands.h"
 #include "core/passes/distance.h"
 #include "core/passes/majority.h"
+#include "core/passes/mean_distance.h"
 #include "core/passes/residual.h"
 #include "core/passes/sampling.h"
 #include "core/passes/shading.h"
@@ -23,7 +24,7 @@ constexpr uint32_t kNearer = 9, kNearerOf = 100;
 constexpr int kMeanDistances = 896, kMeansOfTextures = 1536;
 // Every so manieth row of a frame tells how far its pixels are from L, other rows of each frame;
 // each of them counts at least 1 / kNoiseFrames.
-constexpr int kNoiseRows = 4, kNoiseFrames = 16;
+constexpr int kNoiseRows = 8, kNoiseFrames = 8;
 // Pixels at most so far from foreground say nothing of noise.
 constexpr int kNearForeground = 4;
 // Where noise alone asks for a threshold above this, in levels, means of 3 x 3 pixels are compared:
@@ -48,8 +49,21 @@ int explained_pixels(const uint8_t* mask, const uint16_t* own, const uint16_t* n
 }
 
 // Keeps what is further than its limit.
-void keep_beyond(const uint16_t* own, const uint8_t* limit, int count, uint8_t* mask) {
+void keep_beyond(const uint16_t* __restrict own, const uint8_t* __restrict limit, int count,
+                 uint8_t* __restrict mask) {
   for (int p = 0; p < count; ++p) mask[p] = own[p] > limit[p] * limit[p] ? mask[p] : 0;
+}
+
+// 255 where nothing was set and the distance is within its limit, else 0.
+void keep_within(const uint16_t* __restrict own, const uint8_t* __restrict limit, int count,
+                 uint8_t* __restrict mask) {
+  for (int p = 0; p < count; ++p)
+    mask[p] = (mask[p] == 0) & (own[p] <= limit[p] * limit[p]) ? 255 : 0;
+}
+
+void either(const uint8_t* __restrict a, const uint8_t* __restrict b, const uint8_t* __restrict c,
+            int count, uint8_t* __restrict out) {
+  for (int p = 0; p < count; ++p) out[p] = a[p] | b[p] | c[p];
 }
 
 // The same of mask[p] that is set from `wide` samples to the left to as many to the right.
@@ -161,7 +175,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     else
       band(0, length);
   };
-  noisy_ = steps_.smooth && !frame.fixed && frame.threshold > kNoisy;
+  // Without limits of pixels, what looks like noise may be ghosts.
+  noisy_ = steps_.smooth && !frame.fixed && frame.limits && frame.threshold > kNoisy;
   threshold_ = noisy_ ? std::max(kLeastOfMeans, frame.threshold / 3) : frame.threshold;
   if (shadows_ == Shadows::marked) std::fill(shaded_.begin(), shaded_.end(), uint8_t{0});
   in_bands(height_, parts, [&](int first, int size) { compare(frame, first, size); });
@@ -284,12 +299,14 @@ void Decision::explain_span(const Comparison& frame, int y, int grid_row, int fi
       if (moves(cell, frame)) {
         uint8_t limit[kLongestRun], all[kLongestRun];
         std::copy_n(run.limit + p, size, limit);
-        raise_limit(noise + p, kMeansOfTextures, size, limit);
+        raise_limit(noise + p, kMeansOfTextures, static_cast<size_t>(size), limit);
         keep_beyond(run.nearest + p, limit, size, foreground + p);
         std::fill_n(all, size, uint8_t{255});
-        learn_noise(run.nearest + p, all, size, texture_.share(cell), noise + p);
+        learn_distance(run.nearest + p, all, static_cast<size_t>(size), texture_.share(cell),
+                       noise + p);
       } else {
-        if (!frame.fixed) raise_limit(noise + p, kMeanDistances, size, run.limit + p);
+        if (!frame.fixed)
+          raise_limit(noise + p, kMeanDistances, static_cast<size_t>(size), run.limit + p);
         keep_beyond(run.own + p, run.limit + p, size, foreground + p);
       }
       p = end;
@@ -320,13 +337,14 @@ void Decision::look_at(const Comparison& frame, Run* run) {
     squared_distance(x, level, count, run->own);
   }
   const auto least = static_cast<uint8_t>(std::min(255.0, threshold_));
-  const int part = noisy_ ? 3 : 1;
-  if (frame.limits)
-    std::transform(
-        frame.limits + first, frame.limits + first + count, run->limit,
-        [least, part](int limit) { return std::max(static_cast<uint8_t>(limit / part), least); });
-  else
+  if (!frame.limits) {
     std::fill_n(run->limit, count, least);
+    return;
+  }
+  std::copy_n(frame.limits + first, count, run->limit);
+  if (noisy_)
+    for (size_t p = 0; p < count; ++p) run->limit[p] /= 3;
+  for (size_t p = 0; p < count; ++p) run->limit[p] = std::max(run->limit[p], least);
 }
 
 // Distances from the nearest pixels around.
@@ -388,7 +406,8 @@ void Decision::vote(int first_row, int row_count) {
 // The noise of pixels that are background, and not next to foreground.
 void Decision::learn(const Comparison& frame, int first_row, int row_count) {
   const Grid& grid = texture_.grid();
-  const float share = 1 / static_cast<float>(std::min(frames_ / kNoiseRows + 1, kNoiseFrames));
+  const float share =
+      1 / static_cast<float>(std::min<int64_t>(frames_ / kNoiseRows + 1, kNoiseFrames));
   int grid_row = 0;
   for (int y = first_row; y < first_row + row_count; ++y) {
     if ((y + frames_) % kNoiseRows != 0) continue;
@@ -405,15 +424,18 @@ void Decision::learn(const Comparison& frame, int first_row, int row_count) {
       Run run(y, left, std::min(kLongestRun, width_ - left));
       look_at(frame, &run);
       uint16_t* const noise = noise_.row(y) + left;
-      raise_limit(noise, kMeanDistances, run.count, run.limit);
+      raise_limit(noise, kMeanDistances, static_cast<size_t>(run.count), run.limit);
       uint8_t column[kLongestRun + 2 * kNearForeground], learns[kLongestRun];
-      for (int p = 0; p < run.count + 2 * kNearForeground; ++p) {
-        const int at = std::clamp(left + p - kNearForeground, 0, width_ - 1);
-        column[p] = rows[0][at] | rows[1][at] | rows[2][at];
-      }
+      const int start = left - kNearForeground, wide = run.count + 2 * kNearForeground;
+      if (start >= 0 && start + wide <= width_)
+        either(rows[0] + start, rows[1] + start, rows[2] + start, wide, column);
+      else
+        for (int p = 0; p < wide; ++p) {
+          const int at = std::clamp(start + p, 0, width_ - 1);
+          column[p] = rows[0][at] | rows[1][at] | rows[2][at];
+        }
       widen(column + kNearForeground, run.count, kNearForeground, learns);
-      for (int p = 0; p < run.count; ++p)
-        learns[p] = learns[p] == 0 && run.own[p] <= run.limit[p] * run.limit[p] ? 255 : 0;
+      keep_within(run.own, run.limit, run.count, learns);
       // Textures that move have learnt already.
       while (col < grid.cols && grid.left(col) < left + run.count) {
         const int begin = std::max(grid.left(col), left) - left;
@@ -423,7 +445,7 @@ void Decision::learn(const Comparison& frame, int first_row, int row_count) {
         if (grid.left(col + 1) > left + run.count) break;
         ++col;
       }
-      learn_noise(run.own, learns, run.count, share, noise);
+      learn_distance(run.own, learns, static_cast<size_t>(run.count), share, noise);
     }
   }
 }

@@ -110,7 +110,7 @@ class Decision {
   MovingTexture texture_;
   PixelNoise noise_;
   Specks specks_;
-  int frames_ = 0;
+  int64_t frames_ = 0;
   // Of the frame: means are compared, and what they must exceed.
   bool noisy_ = false;
   double threshold_ = 0;

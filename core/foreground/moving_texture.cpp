@@ -74,7 +74,7 @@ void MovingTexture::end_frame() {
       Cell& cell = cells_[static_cast<size_t>(row * grid_.cols + col)];
       cell.moves = differing > kDiffering * static_cast<float>(around) &&
                    explained > kExplained * differing && cell.least > kAlways * cell.differing;
-      cell.moved += cell.moves;
+      cell.moved = std::min(cell.moved + cell.moves, kMostMoved);
     }
   ++frames_;
 }

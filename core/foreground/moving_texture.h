@@ -38,23 +38,25 @@ class MovingTexture {
 
   // Of the frames in which the cell moved, what the newest one counts in means.
   float share(size_t cell) const {
-    return 1 / static_cast<float>(std::clamp(cells_[cell].moved, 1, 50));
+    return 1 / static_cast<float>(std::max(cells_[cell].moved, 1));
   }
 
  private:
+  static constexpr int kMostMoved = 50;
+
   struct Cell {
     int differ = 0, explained = 0;  // pixels of the frame
     // Shares of the pixels: of about the last 100 frames, of the last 10, and the least of these.
     float differing = 0, explained_share = 0, recent = 0, least = 0;
     bool moves = false;
-    int moved = 0;  // frames in which it did
+    int moved = 0;  // frames in which it did, kMostMoved at most
   };
 
   float sampled_pixels(int row, int col) const;
 
   Grid grid_;
   int row_step_;
-  int frames_ = 0;
+  int64_t frames_ = 0;
   std::vector<Cell> cells_;
 };
 

@@ -8,7 +8,8 @@
 
 namespace qdmd {
 
-// A mean distance of each pixel, in 1/256 level, which follows the newest frames.
+// A mean distance of each pixel, in 1/256 level, which follows the newest frames
+// (learn_distance()).
 class PixelNoise {
  public:
   // Takes all memory. For pictures of width x height pixels.
@@ -26,14 +27,5 @@ class PixelNoise {
   size_t width_;
   std::vector<uint16_t> mean_;
 };
-
-// Moves `count` means by `share` of the way, 0 to 1, towards distances whose squares are given, at
-// most kMostNoise levels; where learns[p] is 0, not.
-constexpr float kMostNoise = 100;
-void learn_noise(const uint16_t* squared, const uint8_t* learns, int count, float share,
-                 uint16_t* mean);
-
-// limit[p] = the larger of limit[p] and `factor` / 256 of the mean, in levels, at most 255.
-void raise_limit(const uint16_t* mean, int factor, int count, uint8_t* limit);
 
 }  // namespace qdmd

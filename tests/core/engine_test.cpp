@@ -323,8 +323,7 @@ TEST(EngineBackground, AMovingBoxIsForegroundOnAStillPicture) {
   for (size_t t = 0; t < count; ++t)
     for (size_t i = 0; i < box; ++i)
       for (size_t c = 0; c < 3; ++c) clip.at(t, c, t * 9 + i) = 230;
-  // Ghosts count as noise, in which means of pixels would be compared.
-  auto options = with_pixels_alone(window_of(static_cast<int>(count)));
+  auto options = window_of(static_cast<int>(count));
   options.dmd.rank = 1;
   Strip strip(pixels, options);
   const auto masks = strip.run(clip, Output::mask);

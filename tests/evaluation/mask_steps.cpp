@@ -111,7 +111,8 @@ struct Region {
   size_t first = 1, last = SIZE_MAX;
 
   explicit Region(const Sequence& sequence) {
-    inside = cv::imread((sequence.folder / "gt/ROI.bmp").string(), cv::IMREAD_GRAYSCALE);
+    const auto region = sequence.folder / "gt/ROI.bmp";
+    if (std::filesystem::exists(region)) inside = cv::imread(region.string(), cv::IMREAD_GRAYSCALE);
     std::ifstream frames(sequence.folder / "gt/temporalROI.txt");
     if (!(frames >> first >> last)) first = 1, last = SIZE_MAX;
   }

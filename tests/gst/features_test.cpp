@@ -330,6 +330,44 @@ TEST(PlanarFormats, ACutoutIsBlackOutside) {
   }
 }
 
+// ---- Shadows ----
+
+// A floor on whose left half a shadow falls from frame 20 on.
+void paint_shadow(int t, int x, int y, uint8_t* rgb) {
+  const int grain = (x * 37 + y * 91) % 31;
+  const double light = t >= 20 && x < 80 ? 0.65 : 1;
+  rgb[0] = static_cast<uint8_t>(light * (150 + grain));
+  rgb[1] = static_cast<uint8_t>(light * (120 + grain));
+  rgb[2] = static_cast<uint8_t>(light * (90 + grain));
+}
+
+TEST(Shadows, AreWhatIsAskedFor) {
+  Stream stream("qdmdbackground mode=live output=mask", GST_VIDEO_FORMAT_RGB, 160, 120);
+  Element element(stream);
+  stream.push_many(0, 20, paint_shadow);
+  int t = 20;
+  // 0: background, 1: foreground, 2: marked. By name and number, and while playing.
+  for (int shadows : {0, 1, 2, 0}) {
+    element.set("shadows", shadows);
+    ASSERT_EQ(GST_FLOW_OK, stream.push(t++, paint_shadow));
+    const auto out = stream.take_all();
+    GstVideoFrame frame;
+    ASSERT_TRUE(gst_video_frame_map(&frame, const_cast<GstVideoInfo*>(&stream.info()),
+                                    out.back().get(), GST_MAP_READ));
+    size_t counts[256] = {};
+    for (int y = 0; y < 120; ++y)
+      for (int x = 0; x < 160; ++x)
+        ++counts[*(static_cast<uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(&frame, 1)) +
+                   y * GST_VIDEO_FRAME_COMP_STRIDE(&frame, 1) +
+                   x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, 1))];
+    gst_video_frame_unmap(&frame);
+    constexpr double kHalf = 80 * 120;
+    EXPECT_EQ(160u * 120u, counts[0] + counts[127] + counts[255]);
+    EXPECT_NEAR(shadows == 1 ? kHalf : 0, double(counts[255]), 0.02 * kHalf) << shadows;
+    EXPECT_NEAR(shadows == 2 ? kHalf : 0, double(counts[127]), 0.02 * kHalf) << shadows;
+  }
+}
+
 // ---- Properties while playing ----
 
 // The pictures are large enough for all threads to have work.

@@ -8,7 +8,7 @@ need_sequences
 more=${QDMD_MORE:-../shared/measure/sequences}
 [ -d "$more/fall" ] || { echo "Set QDMD_MORE to a folder that has CDnet's fall and pedestrians." >&2; exit 1; }
 
-tests/install-dependencies.sh build test demo bench
+tests/install-dependencies.sh build test demo docs
 build gst/libgstqdmd.so gst/libgstqdmdscene.so tests/evaluation/qdmd-mask-steps tests/bench/passes
 
 echo "== steps" >&2
@@ -23,13 +23,11 @@ for scene in $scenes; do
   mkdir -p "$folder/input" "$folder/gt/masks"
   caps="video/x-raw,format=RGB,width=320,height=240,framerate=25/1"
   render() {
-    gst-launch-1.0 -q qdmdscenesrc scene="${scene%%,*}" effects="$3" seed=3 truth="$1" num-buffers=400 ! \
-      $caps ! videoconvert ! pngenc compression-level=1 ! multifilesink index=1 location="$folder/$2/%06d.png"
+    gst-launch-1.0 -q qdmdscenesrc scene="$scene" seed=3 truth="$1" num-buffers=400 ! $caps ! videoconvert ! \
+      pngenc compression-level=1 ! multifilesink index=1 location="$folder/$2/%06d.png"
   }
-  effects=""
-  [ "$scene" = "${scene#*,}" ] || effects=${scene#*,}
-  render none input "$effects"
-  render mask gt/masks "$effects"
+  render none input
+  render mask gt/masks
   # From the second quarter on.
   echo "101 400" >"$folder/gt/temporalROI.txt"
 done
