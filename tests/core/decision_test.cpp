@@ -3,6 +3,7 @@
 #include "core/foreground/decision.h"
 
 #include "core/passes/distance.h"
+#include "core/passes/mean_distance.h"
 #include "core/passes/shading.h"
 #include "tests/core/engine_util.h"
 #include "tests/core/simd_targets.h"
@@ -126,6 +127,62 @@ TEST(Shading, FollowsItsDefinition) {
   });
   EXPECT_GT(shaded, 50u);
   EXPECT_GT(others, 50u);
+}
+
+TEST(Distance, OfMeansIsThatOfTheirPixels) {
+  std::mt19937 rng(330);
+  on_every_target([&] {
+    for (size_t count : {1u, 2u, 15u, 33u, 257u, 600u}) {
+      Rows x(3, count, 1, rng), l(3, count, 1, rng);
+      BeforeTheEdge<uint16_t> out(count);
+      smoothed_distance(x.data(), l.data(), count, out.data());
+      for (int p = 0; p < static_cast<int>(count); ++p) {
+        double squared = 0;
+        for (int c = 0; c < 3; ++c) {
+          int sum = 0;
+          for (int row = 0; row < 3; ++row)
+            for (int col = -1; col <= 1; ++col)
+              sum += x.at[size_t(3 * c + row)][p + col] - l.at[size_t(3 * c + row)][p + col];
+          squared += sum * sum / 81.0;
+        }
+        // Rounded to whole squared levels, from floats.
+        ASSERT_NEAR(out[size_t(p)], std::min(squared, 65535.0), 0.51) << p << " of " << count;
+      }
+    }
+  });
+}
+
+TEST(MeanDistance, IsLearntWhereItMayAndRaisesLimits) {
+  std::mt19937 rng(331);
+  on_every_target([&] {
+    for (size_t count : {1u, 2u, 15u, 33u, 257u})
+      for (float share : {1.0f, 0.125f, 0.02f}) {
+        BeforeTheEdge<uint16_t> squared(count), mean(count);
+        BeforeTheEdge<uint8_t> learns(count), limit(count);
+        for (size_t p = 0; p < count; ++p) {
+          squared[p] = static_cast<uint16_t>(rng() % 65536);
+          mean[p] = static_cast<uint16_t>(rng() % 25601);
+          learns[p] = rng() % 2 ? 255 : 0;
+          limit[p] = static_cast<uint8_t>(rng() % 256);
+        }
+        const std::vector<uint16_t> before(mean.begin(), mean.end());
+        learn_distance(squared.data(), learns.data(), count, share, mean.data());
+        for (size_t p = 0; p < count; ++p) {
+          const double distance = std::min<double>(std::sqrt(double(squared[p])), kMostDistance);
+          const double next = before[p] + double(share) * (256 * distance - before[p]);
+          if (learns[p]) {
+            // Rounded, from floats.
+            ASSERT_NEAR(mean[p], next, 0.51) << p;
+          } else {
+            ASSERT_EQ(mean[p], before[p]) << p;
+          }
+        }
+        const std::vector<uint8_t> limits(limit.begin(), limit.end());
+        raise_limit(mean.data(), 896, count, limit.data());
+        for (size_t p = 0; p < count; ++p)
+          ASSERT_EQ(limit[p], std::min(255, std::max<int>(limits[p], mean[p] * 896 / 65536))) << p;
+      }
+  });
 }
 
 TEST(Specks, AreCountedByFlooding) {
