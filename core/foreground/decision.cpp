@@ -22,8 +22,8 @@ constexpr uint32_t kNearer = 9, kNearerOf = 100;
 // Above so many mean distances, in 1/256, a pixel is foreground. Of Gaussian noise, 3.5 are 5.6
 // sigma. Leaves are further from what is around now and then.
 constexpr int kMeanDistances = 896, kMeansOfTextures = 1536;
-// Every so manieth row of a frame tells how far its pixels are from L, other rows of each frame;
-// each of them counts at least 1 / kNoiseFrames.
+// One row in so many of a frame tells how far its pixels are from L, other rows of each frame. What
+// it tells counts at least 1 / kNoiseFrames.
 constexpr int kNoiseRows = 8, kNoiseFrames = 8;
 // Pixels at most so far from foreground say nothing of noise.
 constexpr int kNearForeground = 4;
@@ -66,7 +66,7 @@ void either(const uint8_t* __restrict a, const uint8_t* __restrict b, const uint
   for (int p = 0; p < count; ++p) out[p] = a[p] | b[p] | c[p];
 }
 
-// The same of mask[p] that is set from `wide` samples to the left to as many to the right.
+// Whether the mask is set at a sample, or `wide` samples to the left or to the right of it.
 void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restrict out) {
   for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
 }
