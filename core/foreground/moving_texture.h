@@ -37,9 +37,7 @@ class MovingTexture {
   void end_frame();
 
   // Of the frames in which the cell moved, what the newest one counts in means.
-  float share(size_t cell) const {
-    return 1 / static_cast<float>(std::max(cells_[cell].moved, 1));
-  }
+  float share(size_t cell) const { return 1 / static_cast<float>(std::max(cells_[cell].moved, 1)); }
 
  private:
   static constexpr int kMostMoved = 50;
