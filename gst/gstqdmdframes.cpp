@@ -421,6 +421,8 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   const bool freeze = state->settings.freeze;
   const int threads = state->settings.engine.threads;
   const double budget = state->settings.time_budget;
+  const Output output = state->settings.output;
+  const bool masks = state->settings.regions || output == Output::mask || output == Output::cutout;
   GST_OBJECT_UNLOCK(self);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
@@ -440,6 +442,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_freeze(freeze);
       engine.set_threads(threads);
       engine.set_time_budget(budget / 1000);
+      engine.set_masks_expected(masks);
       const Status status = engine.push(state->io.read(frame));
       note_solve(self, nullptr);
       return status;

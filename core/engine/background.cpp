@@ -40,7 +40,7 @@ void Background::show(const Learnt& learnt, State state) {
   learner_->follow(learnt.level);
   report_ = {};
   report_.foreground.noise = learnt.noise;
-  set_threshold(fixed_threshold_);
+  set_wishes(wishes_);
   known_ = true;
   state_ = state;
 }
@@ -52,29 +52,30 @@ void Background::begin(const SnapshotRange& snapshots) {
 
 void Background::build(Slice slice) { learner_->build(slice, &models_[next()]); }
 
-void Background::finish(double fixed_threshold) {
+void Background::finish(const MaskWishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
-  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], fixed_threshold);
+  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold);
   // Nobody decides before there is a first model.
-  if (room_.models != Models::two_of_live && !known_ && decision_.new_born()) rehearse();
+  if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
+    rehearse(wishes.threshold > 0);
 }
 
 // What moves is known before the first frame of a stream is decided.
-void Background::rehearse() {
+void Background::rehearse(bool fixed) {
   constexpr int kEvery = 4;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
-    Comparison frame = {{}, &model, foreground.threshold, model.limits()};
+    Comparison frame = {{}, &model, foreground.threshold, fixed ? nullptr : model.limits(), fixed};
     for (int c = 0; c < kChannels; ++c) frame.x[c] = snapshots_->plane(t, c);
     decision_.decide(frame, room_.pool);
   }
 }
 
 void Background::decide(const uint8_t* const x[3], Pool* pool) {
-  const bool fixed = fixed_threshold_ > 0;
+  const bool fixed = wishes_.threshold > 0;
   decision_.decide({{x[0], x[1], x[2]},
                     &model(),
                     report_.foreground.threshold,
@@ -91,7 +92,7 @@ void Background::publish() {
   state_ = State::learnt;
   ++solves_;
   // Another may have been asked for since finish().
-  set_threshold(fixed_threshold_);
+  set_wishes(wishes_);
 }
 
 void Background::hold(double t, State state) {
@@ -106,10 +107,11 @@ void Background::follow_light(int slot) {
   if (learner_->follows_light()) model().set_light(learner_->light(slot));
 }
 
-void Background::set_threshold(double fixed) {
-  fixed_threshold_ = fixed;
+void Background::set_wishes(const MaskWishes& wishes) {
+  wishes_ = wishes;
   ForegroundStatistics& foreground = report_.foreground;
-  foreground.threshold = fixed > 0 ? fixed : automatic_threshold(foreground.noise);
+  foreground.threshold =
+      wishes.threshold > 0 ? wishes.threshold : automatic_threshold(foreground.noise);
 }
 
 }  // namespace qdmd

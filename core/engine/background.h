@@ -16,6 +16,12 @@ struct SolveReport : SolveFacts {
   ForegroundStatistics foreground;
 };
 
+// What callers want of frames' masks.
+struct MaskWishes {
+  double threshold = 0;  // a pixel differs above this quaternion norm; 0: from the noise
+  bool expected = true;  // somebody is going to look at them
+};
+
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
 // thread, one at a time; publish() then makes it the one in use. All other calls are about the one
 // in use.
@@ -47,8 +53,8 @@ class Background {
   void begin(const SnapshotRange& snapshots);
   // Learner::build().
   void build(Slice slice);
-  // After the last slice. fixed_threshold: of the foreground; 0: from the noise.
-  void finish(double fixed_threshold);
+  // After the last slice. wishes: as they were when the work began.
+  void finish(const MaskWishes& wishes);
   // Learnt again.
   void publish();
 
@@ -76,12 +82,11 @@ class Background {
   Decision& decision() { return decision_; }
   const Decision& decision() const { return decision_; }
 
-  // A pixel differs above this quaternion norm; 0: from the noise.
-  void set_threshold(double fixed);
-  double fixed_threshold() const { return fixed_threshold_; }
+  void set_wishes(const MaskWishes& wishes);
+  const MaskWishes& wishes() const { return wishes_; }
 
  private:
-  void rehearse();
+  void rehearse(bool fixed);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 
@@ -96,7 +101,7 @@ class Background {
   State state_ = State::learnt;
   bool known_ = false;
   uint64_t solves_ = 0;
-  double fixed_threshold_ = 0;
+  MaskWishes wishes_;
 };
 
 }  // namespace qdmd

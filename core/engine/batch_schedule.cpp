@@ -90,7 +90,7 @@ void BatchSchedule::end_window(bool at_once) {
       {window_size_, frames().size(), taken() - std::min(history_from_, window.begin)}));
   const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
   waiting_->time_zero = taken() - size;
-  work_ = Work{span, count < size ? count : window.not_added, background().fixed_threshold()};
+  work_ = Work{span, count < size ? count : window.not_added, background().wishes()};
   // Reads how many frames there are.
   if (background().learner().in_one_piece()) background().begin(span);
   if (!at_once) {
@@ -105,7 +105,7 @@ void BatchSchedule::solve() {
   if (work_->fresh > 0) background().learner().add(work_->span, work_->fresh, {});
   if (!background().learner().in_one_piece()) background().begin(work_->span);
   background().build({});
-  background().finish(work_->threshold);
+  background().finish(work_->wishes);
 }
 
 // The last frame of a window has left: the background of the next comes into use.

@@ -51,8 +51,8 @@ class BatchSchedule : public Schedule {
   // The side thread's.
   struct Work {
     SnapshotRange span;
-    int fresh;             // newest frames that enter the Gram matrix
-    double threshold = 0;  // of the foreground, fixed by somebody
+    int fresh;  // newest frames that enter the Gram matrix
+    MaskWishes wishes = {};
   };
 
   int64_t taken() const { return static_cast<int64_t>(frames().frames_taken()); }

@@ -79,6 +79,10 @@ class Engine {
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
+  // Whether somebody is going to ask for masks, cut-outs or foreground(). If not, batch saves the
+  // time in which it learns, from its first window, what masks need; who asks all the same has
+  // masks that learn as frames are decided. True unless it is set.
+  void set_masks_expected(bool expected);
   // What masks make of pixels that only light tells from the background. Takes effect at once.
   void set_shadows(Shadows shadows);
   // While on, the background stays the picture that it was, and nothing is solved; only the first
@@ -107,7 +111,7 @@ class Engine {
   EngineLayout layout_;
   Clock clock_;
   Pace pace_{&clock_};
-  bool freeze_ = false;
+  bool freeze_ = false, masks_expected_ = true;
   Shadows shadows_ = Shadows::background;
   FrameStore frames_;
   std::unique_ptr<Background> background_;

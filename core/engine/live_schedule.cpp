@@ -79,7 +79,7 @@ void LiveSchedule::begin_work() {
 }
 
 void LiveSchedule::run(bool at_once) {
-  fixed_threshold_ = background().fixed_threshold();
+  wishes_ = background().wishes();
   if (!at_once) {
     start([this] { work(); });
     return;
@@ -93,7 +93,7 @@ void LiveSchedule::work() {
   if (build_) {
     background().build({build_->done, build_->slices});
     if (++build_->done == build_->slices) {
-      background().finish(fixed_threshold_);
+      background().finish(wishes_);
       finished_ = build_->first_frame;
       build_.reset();
     }

@@ -63,7 +63,7 @@ class LiveSchedule : public Schedule {
   std::optional<Build> build_;
   std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
   std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
-  double fixed_threshold_ = 0;        // of the foreground, as it was when the work began
+  MaskWishes wishes_;                 // as they were when the work began
 };
 
 }  // namespace qdmd

@@ -79,7 +79,7 @@ class Batch {
     solve = took([&] { background_.begin(frames_.window()); });
     combination = took([&] { background_.build({}); });
     statistics = took([&] {
-      background_.finish(0);
+      background_.finish({});
       background_.publish();
     });
     for (int t = 0; t < c_.window; ++t) output += took([&] { write(t); });

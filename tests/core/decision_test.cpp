@@ -450,12 +450,14 @@ TEST(Decision, DoesNotDependOnThreadsOrOnThePast) {
 // ---- Streams in which there is little to see, at the defaults ----
 
 // The share of white in each mask.
-std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode) {
+std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode,
+                             bool masks_expected = true) {
   EngineOptions options;
   options.mode = mode;
   options.window_size = 50;
   options.threads = 1;
   Engine engine;
+  engine.set_masks_expected(masks_expected);
   EXPECT_TRUE(engine.configure(options, frames[0].width, frames[0].height).ok());
   Picture picture(frames[0].width, frames[0].height, 3, false, 0);
   std::vector<double> shares;
@@ -495,6 +497,18 @@ TEST(LittleToSee, HasNoForeground) {
               sample = static_cast<uint8_t>(level == 90 ? rng() % 256 : static_cast<size_t>(level));
           for (double share : masks_of({count, still}, mode)) ASSERT_EQ(share, 0);
         }
+}
+
+TEST(Rehearsal, KnowsLeavesFromTheFirstFrameOnWhereMasksAreExpected) {
+  std::mt19937 rng(327);
+  Planes leaves = leaves_of(320, 240, rng);
+  std::vector<Planes> frames;
+  for (int t = 0; t < 50; ++t) frames.push_back(in_wind(leaves, 200, rng));
+  const auto expected = masks_of(frames, Mode::batch),
+             surprised = masks_of(frames, Mode::batch, false);
+  EXPECT_LT(expected.front(), 0.01);
+  EXPECT_GT(surprised.front(), 0.05);
+  EXPECT_LT(surprised.back(), 0.01);
 }
 
 TEST(LittleToSee, NoiseIsNoForeground) {
