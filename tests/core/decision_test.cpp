@@ -64,9 +64,13 @@ TEST(Distance, IsTheNearestOfThePixelsAround) {
 TEST(Shading, FollowsItsDefinition) {
   std::mt19937 rng(321);
   size_t shaded = 0, others = 0;
+  LightRange other;
+  other.darkest = 0.7f, other.brightest = 1.05f, other.of_level = 0.2f;
+  other.alone = 0.8f, other.around = 0.6f, other.least_rest = 5;
   on_every_target([&] {
     for (size_t count : {1u, 2u, 7u, 16u, 27u, 28u})
       for (const auto& black : {std::array<uint8_t, 3>{0, 0, 0}, {16, 128, 128}}) {
+        const LightRange range = rng() % 2 ? LightRange() : other;
         Rows l(kShadingAlong, count, kShadingReach, rng),
             x(kShadingAlong, count, kShadingReach, rng);
         // About the background in another light.
@@ -85,7 +89,7 @@ TEST(Shading, FollowsItsDefinition) {
         for (size_t p = 0; p < count; ++p) {
           limit[p] = static_cast<uint8_t>(rng() % 3 ? 4 + rng() % 20 : rng() % 256);
         }
-        find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), count,
+        find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), range, count,
                     out.data());
         for (int p = 0; p < static_cast<int>(count); ++p) {
           // <x, L>, <L, L>, <x, x> of the pixel, and of those around.
@@ -110,15 +114,18 @@ TEST(Shading, FollowsItsDefinition) {
             return sums[2] - sums[0] * sums[0] / sums[1];
           };
           const double a = own[0] / own[1];
-          const double most = std::max(3.0, 0.5 * limit[size_t(p)]);
-          const double texture = std::max(3.0, 0.75 * limit[size_t(p)]);
+          const double least = double{range.least_rest};
+          const double most = std::min(std::max(least, double{range.alone} * limit[size_t(p)]),
+                                       double{range.of_level} * std::sqrt(own[1]));
+          const double texture = std::max(least, double{range.around} * limit[size_t(p)]);
           // What floats round away decides nothing here.
-          if (std::abs(rest(own) - most * most) < 0.05 || std::abs(a - 0.5) < 1e-5 ||
+          const double darkest = double{range.darkest}, brightest = double{range.brightest};
+          if (std::abs(rest(own) - most * most) < 0.05 || std::abs(a - darkest) < 1e-5 ||
               std::abs(rest(around) / pixels - texture * texture) < 0.05 ||
-              std::abs(a - 1.15) < 1e-5)
+              std::abs(a - brightest) < 1e-5)
             continue;
-          const bool expected = differing.at[kShadingReach][p] && own[1] > 0 && a >= 0.5 &&
-                                a <= 1.15 && rest(own) <= most * most &&
+          const bool expected = differing.at[kShadingReach][p] && own[1] > 0 && a >= darkest &&
+                                a <= brightest && rest(own) <= most * most &&
                                 rest(around) <= pixels * texture * texture;
           ++(expected ? shaded : others);
           ASSERT_EQ(out[size_t(p)], expected ? 255 : 0) << p << " of " << count;
@@ -168,7 +175,8 @@ TEST(MeanDistance, IsLearntWhereItMayAndRaisesLimits) {
         const std::vector<uint16_t> before(mean.begin(), mean.end());
         learn_distance(squared.data(), learns.data(), count, share, mean.data());
         for (size_t p = 0; p < count; ++p) {
-          const double distance = std::min<double>(std::sqrt(double(squared[p])), kMostDistance);
+          const double distance =
+              std::min<double>(std::sqrt(double(squared[p])), kMostMeanDistance);
           const double next = before[p] + double(share) * (256 * distance - before[p]);
           if (learns[p]) {
             // Rounded, from floats.
@@ -260,8 +268,9 @@ struct Planes {
 // What a model makes of one picture, for ever.
 BackgroundModel model_of(const Planes& background) {
   BackgroundModel model;
-  model.make_room(background.pixels(), false);
-  model.freeze_as(background.level, nullptr, background.pixels());
+  const std::vector<uint8_t> limits(background.pixels(), 12);
+  model.make_room(background.pixels(), true);
+  model.freeze_as(background.level, &limits, background.pixels());
   model.set_time(0);
   return model;
 }
@@ -271,8 +280,11 @@ struct Decided {
       : model(model_of(background)),
         decision(background.width, background.height, colours, steps) {}
   const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
-    decision.decide(
-        {{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()}, &model, 18}, pool);
+    decision.decide({{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
+                     &model,
+                     18,
+                     model.limits()},
+                    pool);
     return decision.mask();
   }
   BackgroundModel model;
