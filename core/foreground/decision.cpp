@@ -19,15 +19,21 @@ namespace {
 constexpr size_t kPixelsPerPart = 65536;
 // Pixels at most so far from foreground may say nothing of noise.
 constexpr int kMostNear = 16;
-// Runs end at multiples of it where the row goes on: no vector is begun for a few pixels.
+// Runs of pixels that are looked at together.
 constexpr int kRunUnit = 32, kLongestRun = 256;
 
 int in_256ths(double value) { return static_cast<int>(std::lround(256 * value)); }
 
-// Keeps what is further than its limit.
-void keep_beyond(const uint16_t* __restrict own, const uint8_t* __restrict limit, int count,
-                 uint8_t* __restrict mask) {
-  for (int p = 0; p < count; ++p) mask[p] = own[p] > limit[p] * limit[p] ? mask[p] : 0;
+// Whether any sample of a mask is set.
+bool differs(const uint8_t* mask, int count) {
+  uint64_t any = 0;
+  int p = 0;
+  for (uint64_t eight; p + 8 <= count; p += 8) {
+    std::memcpy(&eight, mask + p, 8);
+    any |= eight;
+  }
+  for (; p < count; ++p) any |= mask[p];
+  return any != 0;
 }
 
 void either(const uint8_t* __restrict a, const uint8_t* __restrict b, const uint8_t* __restrict c,
@@ -86,6 +92,44 @@ struct Decision::Around {
 
  private:
   uint8_t inside_[3 * kAlong][kMost + 2 * kReach];
+};
+
+// What find_shaded() wants to see of a run.
+struct Decision::Lit {
+  ShadingRows rows;
+
+  Lit(Decision& all, int y, int left, int count) {
+    constexpr int kReach = kShadingReach;
+    const Shape& shape = all.shape_;
+    if (y >= kReach && y + kReach < shape.height && left >= kReach &&
+        left + count + kReach <= shape.width) {
+      const int top = y - kReach;
+      for (int c = 0; c < kChannels; ++c) {
+        rows.x[c] = all.now_.frame.x[c] + shape.first(top) + left;
+        rows.l[c] = all.level_row(c, top) + left;
+      }
+      rows.differing = all.differing_row(top) + left;
+      rows.x_step = static_cast<size_t>(shape.width);
+      rows.l_step = shape.stride;
+      return;
+    }
+    const Around<kReach, kMost> around(all, y, left, count);
+    const auto copy = [&](const uint8_t* const* from, int which) {
+      for (int i = 0; i < kShadingAlong; ++i)
+        std::copy_n(from[i] - kReach, count + 2 * kReach, copies_[which][i]);
+      return copies_[which][0] + kReach;
+    };
+    for (int c = 0; c < kChannels; ++c) {
+      rows.x[c] = copy(around.x + kShadingAlong * c, c);
+      rows.l[c] = copy(around.level + kShadingAlong * c, kChannels + c);
+    }
+    rows.differing = copy(around.differing, 2 * kChannels);
+    rows.x_step = rows.l_step = kMost + 2 * kReach;
+  }
+
+ private:
+  static constexpr int kMost = kShadingRun;
+  uint8_t copies_[2 * kChannels + 1][kShadingAlong][kMost + 2 * kShadingReach];
 };
 
 int voting_reach(int width, int height) {
@@ -228,81 +272,80 @@ void Decision::repeat_border(uint8_t* row) const {
 void Decision::explain(int grid_row) {
   const Grid& grid = texture_.grid();
   const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
+  bool moving = false;
+  for (int col = 0; col < grid.cols; ++col) moving |= moves(first_cell + static_cast<size_t>(col));
   for (int y = grid.top(grid_row); y < grid.top(grid_row + 1); ++y) {
     const uint8_t* const differing = differing_row(y);
-    uint8_t* const foreground = foreground_row(y);
-    std::memcpy(foreground, differing, static_cast<size_t>(shape_.width));
-    // Neighbouring cells are one span.
-    for (int col = 0; col < grid.cols;) {
-      const auto busy = [&](int at) {
-        const int left = grid.left(at), right = grid.left(at + 1);
-        return moves(first_cell + static_cast<size_t>(at)) ||
-               std::memchr(differing + left, 255, static_cast<size_t>(right - left)) != nullptr;
-      };
-      if (!busy(col)) {
-        ++col;
+    std::memcpy(foreground_row(y), differing, static_cast<size_t>(shape_.width));
+    int col = 0;
+    const auto busy = [&](int left) {
+      const int right = std::min(left + kRunUnit, shape_.width);
+      if (differs(differing + left, right - left)) return true;
+      if (!moving) return false;
+      int at = col;
+      while (grid.left(at + 1) <= left) ++at;
+      for (; at < grid.cols && grid.left(at) < right; ++at)
+        if (moves(first_cell + static_cast<size_t>(at))) return true;
+      return false;
+    };
+    for (int left = 0; left < shape_.width;) {
+      if (!busy(left)) {
+        left += kRunUnit;
         continue;
       }
-      const int first = col;
-      while (col < grid.cols && busy(col)) ++col;
-      explain_span(y, grid_row, first, col);
+      int right = left + kRunUnit;
+      while (right < std::min(left + kLongestRun, shape_.width) && busy(right)) right += kRunUnit;
+      while (grid.left(col + 1) <= left) ++col;
+      explain_run(y, left, std::min(right, shape_.width), grid_row, col);
+      left = right;
     }
-    repeat_border(foreground);
+    repeat_border(foreground_row(y));
   }
 }
 
-// Columns of cells first .. last - 1 of a row of pixels.
-void Decision::explain_span(int y, int grid_row, int first, int last) {
+// Columns left .. right - 1 of a row of pixels; `col` is the first one's cell.
+void Decision::explain_run(int y, int left, int right, int grid_row, int col) {
   const Grid& grid = texture_.grid();
   const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
   // Where nothing moves, a few rows are enough.
   const bool sampled = now_.textures && texture_.samples(y);
   bool moving = false;
-  for (int at = first; at < last; ++at) moving |= moves(first_cell + static_cast<size_t>(at));
-  int col = first;
-  for (int left = grid.left(first), right = grid.left(last); left < right;) {
-    const int count = std::min(kLongestRun, right - left);
-    // Samples behind the span are of no use, but quicker.
-    Run run(y, left, std::min((count + kRunUnit - 1) / kRunUnit * kRunUnit, shape_.width - left));
-    look_at(&run);
-    if (sampled || moving) look_around(&run);
-    uint16_t moved[kLongestRun];
-    if (sampled) {
-      const Around<0, kLongestRun> middle(*this, y, left, run.count);
-      const uint8_t* const before[3] = {texture_.before(0, y) + left, texture_.before(1, y) + left,
-                                        texture_.before(2, y) + left};
-      squared_distance(middle.x, before, static_cast<size_t>(run.count), moved);
-    }
-    const uint8_t* const differing = differing_row(y) + left;
-    uint8_t* const foreground = foreground_row(y) + left;
-    uint16_t* const noise = noise_.row(y) + left;
-    for (int p = 0; p < count;) {
-      const int end = std::min(count, grid.left(col + 1) - left), size = end - p;
-      const size_t cell = first_cell + static_cast<size_t>(col);
-      if (sampled)
-        texture_.add(cell, {differing + p, run.own + p, run.nearest + p, moved + p, size},
-                     now_.frame.threshold);
-      if (moves(cell)) {
-        uint8_t limit[kLongestRun], all[kLongestRun];
-        std::copy_n(run.limit + p, size, limit);
-        raise_limit(noise + p, in_256ths(constants().means_of_textures), static_cast<size_t>(size),
-                    limit);
-        keep_beyond(run.nearest + p, limit, size, foreground + p);
-        std::fill_n(all, size, uint8_t{255});
-        learn_distance(run.nearest + p, all, static_cast<size_t>(size), texture_.share(cell),
-                       noise + p);
-      } else {
-        if (!now_.frame.fixed)
-          raise_limit(noise + p, in_256ths(constants().mean_distances), static_cast<size_t>(size),
-                      run.limit + p);
-        keep_beyond(run.own + p, run.limit + p, size, foreground + p);
-      }
-      p = end;
-      if (left + end == grid.left(col + 1)) ++col;
-    }
-    if (knows_light_ && shadows_ != Shadows::foreground) leave_shadows(run, count);
-    left += count;
+  for (int at = col; at < grid.cols && grid.left(at) < right; ++at)
+    moving |= moves(first_cell + static_cast<size_t>(at));
+  Run run(y, left, right - left);
+  look_at(&run);
+  if (sampled || moving) look_around(&run);
+  uint16_t moved[kLongestRun];
+  if (sampled) {
+    const Around<0, kLongestRun> middle(*this, y, left, run.count);
+    const uint8_t* const before[3] = {texture_.before(0, y) + left, texture_.before(1, y) + left,
+                                      texture_.before(2, y) + left};
+    squared_distance(middle.x, before, static_cast<size_t>(run.count), moved);
   }
+  const uint8_t* const differing = differing_row(y) + left;
+  uint8_t* const foreground = foreground_row(y) + left;
+  uint16_t* const noise = noise_.row(y) + left;
+  for (int p = 0; p < run.count; ++col) {
+    const int end = std::min(run.count, grid.left(col + 1) - left);
+    const auto size = static_cast<size_t>(end - p);
+    const size_t cell = first_cell + static_cast<size_t>(col);
+    if (sampled)
+      texture_.add(cell, {differing + p, run.own + p, run.nearest + p, moved + p, end - p},
+                   now_.frame.threshold);
+    if (moves(cell)) {
+      uint8_t limit[kLongestRun];
+      std::copy_n(run.limit + p, size, limit);
+      raise_limit(noise + p, in_256ths(constants().means_of_textures), size, limit);
+      keep_beyond(run.nearest + p, limit, size, foreground + p);
+      learn_distance(run.nearest + p, size, texture_.share(cell), noise + p);
+    } else {
+      if (!now_.frame.fixed)
+        raise_limit(noise + p, in_256ths(constants().mean_distances), size, run.limit + p);
+      keep_beyond(run.own + p, run.limit + p, size, foreground + p);
+    }
+    p = end;
+  }
+  if (knows_light_ && shadows_ != Shadows::foreground) leave_shadows(run);
 }
 
 // Distances and limits of a run.
@@ -339,17 +382,16 @@ void Decision::look_around(Run* run) {
   nearest_distance(middle.x, rows, static_cast<size_t>(run->count), shape_.step, run->nearest);
 }
 
-// The first `count` pixels of a run.
-void Decision::leave_shadows(const Run& run, int count) {
+void Decision::leave_shadows(const Run& run) {
   constexpr auto kMost = static_cast<int>(kShadingRun);
-  for (int first = 0; first < count; first += kMost) {
-    const int left = run.left + first, size = std::min(kMost, count - first);
+  for (int first = 0; first < run.count; first += kMost) {
+    const int left = run.left + first, size = std::min(kMost, run.count - first);
     uint8_t* const foreground = foreground_row(run.y) + left;
     if (!std::memchr(foreground, 255, static_cast<size_t>(size))) continue;
-    const Around<kShadingReach, kMost> around(*this, run.y, left, size);
+    const Lit lit(*this, run.y, left, size);
     uint8_t shaded[kMost];
-    find_shaded(around.x, around.level, black_, around.differing, run.limit + first,
-                constants().light, static_cast<size_t>(size), shaded);
+    find_shaded(lit.rows, black_, foreground, run.limit + first, constants().light,
+                static_cast<size_t>(size), shaded);
     take_out(shaded, size, foreground, of_.shaded.data() + shape_.first(run.y) + left);
   }
 }

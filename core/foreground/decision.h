@@ -98,6 +98,7 @@ class Decision {
   struct Run;
   template <int kReach, int kMost>
   struct Around;
+  struct Lit;
 
   uint8_t* level_row(int channel, int y) { return of_.level[channel].data() + shape_.offset(y); }
   uint8_t* differing_row(int y) { return of_.differing.data() + shape_.offset(y); }
@@ -108,10 +109,10 @@ class Decision {
   void compare(int first_row, int row_count);
   void compare_means(int first_row, int row_count);
   void explain(int grid_row);
-  void explain_span(int y, int grid_row, int first, int last);
+  void explain_run(int y, int left, int right, int grid_row, int col);
   void look_at(Run* run);
   void look_around(Run* run);
-  void leave_shadows(const Run& run, int count);
+  void leave_shadows(const Run& run);
   void vote(int first_row, int row_count);
   void learn(int first_row, int row_count);
   // Samples in the margins.

@@ -10,12 +10,15 @@ namespace qdmd {
 constexpr float kMostMeanDistance = 100;
 
 // Moves mean[p], in 1/256 level, by `share` of the way, 0 to 1, towards the distance whose square
-// is squared[p], at most kMostMeanDistance; where learns[p] is 0, not.
-void learn_distance(const uint16_t* squared, const uint8_t* learns, size_t count, float share,
-                    uint16_t* mean);
+// is squared[p], at most kMostMeanDistance.
+void learn_distance(const uint16_t* squared, size_t count, float share, uint16_t* mean);
 
-// limit[p] = the larger of limit[p] and `factor` / 256 of the mean, in levels, at most 255.
+// limit[p] = the larger of limit[p] and `factor` / 256 of the mean, in levels, at most 255. factor:
+// below 65536.
 void raise_limit(const uint16_t* mean, int factor, size_t count, uint8_t* limit);
+
+// mask[p] = 0 where the distance is at most limit[p] levels.
+void keep_beyond(const uint16_t* squared, const uint8_t* limit, size_t count, uint8_t* mask);
 
 // How means follow what a frame showed.
 struct NoiseRates {

@@ -28,17 +28,20 @@ HWY_INLINE hn::Vec<F32> load_float(const uint8_t* from, hn::Vec<I32> black) {
   return hn::ConvertTo(F32(), hn::Sub(load(from), black));
 }
 
-// A run and what is around it, all of them kWhole samples from where they begin.
+// A whole run and what is around it: where that begins.
 struct Whole {
-  const uint8_t *x[3 * kShadingAlong], *l[3 * kShadingAlong], *differing[kShadingAlong];
-  alignas(64) uint8_t limit[kWhole];
+  ShadingRows rows;
+  alignas(64) uint8_t limit[kWhole], asked[kWhole];
+
+  const uint8_t* x(size_t channel, size_t row) const { return rows.x[channel] + row * rows.x_step; }
+  const uint8_t* l(size_t channel, size_t row) const { return rows.l[channel] + row * rows.l_step; }
+  const uint8_t* differing(size_t row) const { return rows.differing + row * rows.l_step; }
 };
 
 // Of pixels alone. Returns whether any is shaded.
 HWY_INLINE bool shaded_alone(const Whole& whole, const uint8_t* black, const LightRange& range,
                              uint8_t* HWY_RESTRICT out) {
   const F32 df;
-  constexpr size_t kMiddle = kShadingReach;
   const auto dark_red = hn::Set(I32(), black[0]), dark_green = hn::Set(I32(), black[1]),
              dark_blue = hn::Set(I32(), black[2]);
   const auto darkest = hn::Set(df, range.darkest), brightest = hn::Set(df, range.brightest),
@@ -46,12 +49,12 @@ HWY_INLINE bool shaded_alone(const Whole& whole, const uint8_t* black, const Lig
              of_level = hn::Set(df, range.of_level * range.of_level);
   bool any = false;
   for (size_t p = 0; p < kWhole; p += hn::Lanes(df)) {
-    const auto r = load_float(whole.x[kMiddle] + p, dark_red),
-               g = load_float(whole.x[kShadingAlong + kMiddle] + p, dark_green),
-               b = load_float(whole.x[2 * kShadingAlong + kMiddle] + p, dark_blue);
-    const auto lit_r = load_float(whole.l[kMiddle] + p, dark_red),
-               lit_g = load_float(whole.l[kShadingAlong + kMiddle] + p, dark_green),
-               lit_b = load_float(whole.l[2 * kShadingAlong + kMiddle] + p, dark_blue);
+    const auto r = load_float(whole.x(0, kShadingReach) + p, dark_red),
+               g = load_float(whole.x(1, kShadingReach) + p, dark_green),
+               b = load_float(whole.x(2, kShadingReach) + p, dark_blue);
+    const auto lit_r = load_float(whole.l(0, kShadingReach) + p, dark_red),
+               lit_g = load_float(whole.l(1, kShadingReach) + p, dark_green),
+               lit_b = load_float(whole.l(2, kShadingReach) + p, dark_blue);
     // Whole numbers below 2^24.
     const auto xl = hn::Add(hn::Add(hn::Mul(r, lit_r), hn::Mul(g, lit_g)), hn::Mul(b, lit_b));
     const auto ll =
@@ -67,8 +70,8 @@ HWY_INLINE bool shaded_alone(const Whole& whole, const uint8_t* black, const Lig
     const auto lit = hn::And(hn::And(hn::Gt(ll, hn::Zero(df)), hn::Ge(xl, hn::Mul(darkest, ll))),
                              hn::Le(xl, hn::Mul(brightest, ll)));
     const auto shaded = hn::And(lit, hn::Le(rest, hn::Mul(most, ll)));
-    const auto chosen = hn::And(hn::VecFromMask(I32(), hn::RebindMask(I32(), shaded)),
-                                load(whole.differing[kMiddle] + p));
+    const auto chosen =
+        hn::And(hn::VecFromMask(I32(), hn::RebindMask(I32(), shaded)), load(whole.asked + p));
     any |= !hn::AllFalse(I32(), hn::Ne(chosen, hn::Zero(I32())));
     hn::StoreU(hn::DemoteTo(U8(), chosen), U8(), out + p);
   }
@@ -92,14 +95,14 @@ HWY_INLINE void add_columns(const Whole& whole, const uint8_t* black,
     for (size_t row = 0; row < kShadingAlong; ++row) {
       auto own_xl = hn::Zero(df), own_ll = own_xl, own_xx = own_xl;
       for (size_t c = 0; c < 3; ++c) {
-        const auto x = load_float(whole.x[kShadingAlong * c + row] + p, dark[c]),
-                   l = load_float(whole.l[kShadingAlong * c + row] + p, dark[c]);
+        const auto x = load_float(whole.x(c, row) + p, dark[c]),
+                   l = load_float(whole.l(c, row) + p, dark[c]);
         own_xl = hn::MulAdd(x, l, own_xl);
         own_ll = hn::MulAdd(l, l, own_ll);
         own_xx = hn::MulAdd(x, x, own_xx);
       }
       const auto differs =
-          hn::RebindMask(df, hn::Ne(load(whole.differing[row] + p), hn::Zero(I32())));
+          hn::RebindMask(df, hn::Ne(load(whole.differing(row) + p), hn::Zero(I32())));
       xl = hn::Add(xl, hn::IfThenElseZero(differs, own_xl));
       ll = hn::Add(ll, hn::IfThenElseZero(differs, own_ll));
       xx = hn::Add(xx, hn::IfThenElseZero(differs, own_xx));
@@ -143,29 +146,32 @@ HWY_INLINE void alike_around(const Whole& whole, const uint8_t* black, const Lig
 
 }  // namespace
 
-void shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
-            const uint8_t* const* differing, const uint8_t* limit, const LightRange& range,
-            size_t count, uint8_t* out) {
+void shaded(const ShadingRows& rows, const uint8_t* black, const uint8_t* asked,
+            const uint8_t* limit, const LightRange& range, size_t count, uint8_t* out) {
   Whole whole;
   // Parts of runs are copied into whole ones.
-  alignas(64) uint8_t copies[7 * kShadingAlong][kWhole];
-  const bool part = count < kShadingRun;
-  size_t copied = 0;
-  const auto take = [&](const uint8_t* const* rows, size_t size, const uint8_t** to) {
-    for (size_t i = 0; i < size; ++i) {
-      to[i] = rows[i] - kShadingReach;
-      if (!part) continue;
-      uint8_t* const copy = copies[copied++];
-      std::fill_n(std::copy_n(to[i], count + 2 * kShadingReach, copy), kShadingRun - count,
+  alignas(64) uint8_t copies[7][kShadingAlong][kWhole];
+  const auto begin = [&](const uint8_t* row, size_t step, size_t which) {
+    row -= kShadingReach;
+    if (count == kShadingRun) return row;
+    for (auto& copy : copies[which]) {
+      std::fill_n(std::copy_n(row, count + 2 * kShadingReach, copy), kShadingRun - count,
                   uint8_t{0});
-      to[i] = copy;
+      row += step;
     }
+    return static_cast<const uint8_t*>(copies[which][0]);
   };
-  take(x, 3 * kShadingAlong, whole.x);
-  take(l, 3 * kShadingAlong, whole.l);
-  take(differing, kShadingAlong, whole.differing);
+  for (size_t c = 0; c < 3; ++c) {
+    whole.rows.x[c] = begin(rows.x[c], rows.x_step, c);
+    whole.rows.l[c] = begin(rows.l[c], rows.l_step, 3 + c);
+  }
+  whole.rows.differing = begin(rows.differing, rows.l_step, 6);
+  whole.rows.x_step = count == kShadingRun ? rows.x_step : kWhole;
+  whole.rows.l_step = count == kShadingRun ? rows.l_step : kWhole;
   std::fill_n(whole.limit, kWhole, uint8_t{0});
   std::copy_n(limit, count, whole.limit + kShadingReach);
+  std::fill_n(whole.asked, kWhole, uint8_t{0});
+  std::copy_n(asked, count, whole.asked + kShadingReach);
   alignas(64) uint8_t found[kWhole + kShadingReach];
   // found[p + kShadingReach] is of pixel p, then found[p].
   const bool any = shaded_alone(whole, black, range, found);
@@ -183,10 +189,9 @@ namespace qdmd {
 
 HWY_EXPORT(shaded);
 
-void find_shaded(const uint8_t* const* x, const uint8_t* const* l, const uint8_t* black,
-                 const uint8_t* const* differing, const uint8_t* limit, const LightRange& range,
-                 size_t count, uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(shaded)(x, l, black, differing, limit, range, count, out);
+void find_shaded(const ShadingRows& rows, const uint8_t* black, const uint8_t* asked,
+                 const uint8_t* limit, const LightRange& range, size_t count, uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(shaded)(rows, black, asked, limit, range, count, out);
 }
 
 }  // namespace qdmd

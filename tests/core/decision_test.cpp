@@ -13,17 +13,16 @@ namespace {
 
 // ---- Passes ----
 
-// Rows of three channels with `margin` samples more on both sides, before an inaccessible page.
+// Rows of three channels with `margin` samples more on both sides, one after another before an
+// inaccessible page.
 struct Rows {
-  Rows(size_t rows, size_t count, size_t margin_, std::mt19937& rng) : margin(margin_) {
-    for (size_t i = 0; i < 3 * rows; ++i) {
-      memory.push_back(std::make_unique<BeforeTheEdge<uint8_t>>(count + 2 * margin));
-      for (uint8_t& sample : *memory.back()) sample = static_cast<uint8_t>(rng() % 256);
-      at.push_back(memory.back()->data() + margin);
-    }
+  Rows(size_t rows, size_t count, size_t margin, std::mt19937& rng)
+      : step(count + 2 * margin), memory(3 * rows * step) {
+    for (uint8_t& sample : memory) sample = static_cast<uint8_t>(rng() % 256);
+    for (size_t i = 0; i < 3 * rows; ++i) at.push_back(memory.data() + i * step + margin);
   }
-  size_t margin;
-  std::vector<std::unique_ptr<BeforeTheEdge<uint8_t>>> memory;
+  size_t step;
+  BeforeTheEdge<uint8_t> memory;
   std::vector<uint8_t*> at;
 
   const uint8_t* const* data() const { return const_cast<const uint8_t* const*>(at.data()); }
@@ -83,14 +82,18 @@ TEST(Shading, FollowsItsDefinition) {
                 std::clamp(lit + static_cast<double>(rng() % 9) - 4, 0.0, 255.0));
           }
         Rows differing(kShadingAlong, count, kShadingReach, rng);
-        for (auto& row : differing.memory)
-          for (uint8_t& sample : *row) sample = sample % 4 ? 255 : 0;
-        BeforeTheEdge<uint8_t> limit(count), out(count);
+        for (uint8_t& sample : differing.memory) sample = sample % 4 ? 255 : 0;
+        BeforeTheEdge<uint8_t> limit(count), asked(count), out(count);
         for (size_t p = 0; p < count; ++p) {
           limit[p] = static_cast<uint8_t>(rng() % 3 ? 4 + rng() % 20 : rng() % 256);
+          asked[p] = rng() % 4 ? 255 : 0;
         }
-        find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), range, count,
-                    out.data());
+        const ShadingRows rows = {{x.at[0], x.at[kShadingAlong], x.at[2 * kShadingAlong]},
+                                  {l.at[0], l.at[kShadingAlong], l.at[2 * kShadingAlong]},
+                                  differing.at[0],
+                                  x.step,
+                                  l.step};
+        find_shaded(rows, black.data(), asked.data(), limit.data(), range, count, out.data());
         for (int p = 0; p < static_cast<int>(count); ++p) {
           // <x, L>, <L, L>, <x, x> of the pixel, and of those around.
           double own[3] = {}, around[3] = {};
@@ -124,8 +127,8 @@ TEST(Shading, FollowsItsDefinition) {
               std::abs(rest(around) / pixels - texture * texture) < 0.05 ||
               std::abs(a - brightest) < 1e-5)
             continue;
-          const bool expected = differing.at[kShadingReach][p] && own[1] > 0 && a >= darkest &&
-                                a <= brightest && rest(own) <= most * most &&
+          const bool expected = asked[size_t(p)] && own[1] > 0 && a >= darkest && a <= brightest &&
+                                rest(own) <= most * most &&
                                 rest(around) <= pixels * texture * texture;
           ++(expected ? shaded : others);
           ASSERT_EQ(out[size_t(p)], expected ? 255 : 0) << p << " of " << count;
@@ -159,38 +162,82 @@ TEST(Distance, OfMeansIsThatOfTheirPixels) {
   });
 }
 
-TEST(MeanDistance, IsLearntWhereItMayAndRaisesLimits) {
+TEST(MeanDistance, IsLearntAndRaisesLimits) {
   std::mt19937 rng(331);
   on_every_target([&] {
     for (size_t count : {1u, 2u, 15u, 33u, 257u})
       for (float share : {1.0f, 0.125f, 0.02f}) {
         BeforeTheEdge<uint16_t> squared(count), mean(count);
-        BeforeTheEdge<uint8_t> learns(count), limit(count);
+        BeforeTheEdge<uint8_t> limit(count), mask(count);
         for (size_t p = 0; p < count; ++p) {
           squared[p] = static_cast<uint16_t>(rng() % 65536);
           mean[p] = static_cast<uint16_t>(rng() % 25601);
-          learns[p] = rng() % 2 ? 255 : 0;
           limit[p] = static_cast<uint8_t>(rng() % 256);
+          mask[p] = rng() % 2 ? 255 : 0;
         }
         const std::vector<uint16_t> before(mean.begin(), mean.end());
-        learn_distance(squared.data(), learns.data(), count, share, mean.data());
+        learn_distance(squared.data(), count, share, mean.data());
         for (size_t p = 0; p < count; ++p) {
           const double distance =
               std::min<double>(std::sqrt(double(squared[p])), kMostMeanDistance);
           const double next = before[p] + double(share) * (256 * distance - before[p]);
-          if (learns[p]) {
-            // Rounded, from floats.
-            ASSERT_NEAR(mean[p], next, 0.51) << p;
-          } else {
-            ASSERT_EQ(mean[p], before[p]) << p;
-          }
+          // Rounded, from floats.
+          ASSERT_NEAR(mean[p], next, 0.51) << p;
         }
-        const std::vector<uint8_t> limits(limit.begin(), limit.end());
+        const std::vector<uint8_t> limits(limit.begin(), limit.end()),
+            masks(mask.begin(), mask.end());
         raise_limit(mean.data(), 896, count, limit.data());
-        for (size_t p = 0; p < count; ++p)
+        keep_beyond(squared.data(), limit.data(), count, mask.data());
+        for (size_t p = 0; p < count; ++p) {
           ASSERT_EQ(limit[p], std::min(255, std::max<int>(limits[p], mean[p] * 896 / 65536))) << p;
+          ASSERT_EQ(mask[p], squared[p] > limit[p] * limit[p] ? masks[p] : 0) << p;
+        }
       }
   });
+}
+
+TEST(MeanDistance, FollowsBackgroundAndWhatComesForAMoment) {
+  std::mt19937 rng(332);
+  size_t calm = 0, moments = 0, others = 0;
+  on_every_target([&] {
+    for (size_t count : {1u, 2u, 15u, 33u, 257u})
+      for (const NoiseRates& rates :
+           {NoiseRates{896, 768, 0.125f, 0.25f}, NoiseRates{512, 300, 1, 0}}) {
+        BeforeTheEdge<uint16_t> squared(count), mean(count);
+        BeforeTheEdge<uint8_t> limit(count), near(count), now(count), before(count);
+        for (size_t p = 0; p < count; ++p) {
+          const auto distance = rng() % 200;
+          squared[p] = static_cast<uint16_t>(distance * distance + rng() % 7);
+          mean[p] = static_cast<uint16_t>(rng() % 25601);
+          limit[p] = static_cast<uint8_t>(rng() % 256);
+          now[p] = rng() % 2 ? 255 : 0;
+          near[p] = now[p] || rng() % 3 == 0 ? 255 : 0;
+          before[p] = rng() % 2 ? 255 : 0;
+        }
+        const std::vector<uint16_t> known(mean.begin(), mean.end());
+        learn_noise(squared.data(), limit.data(), near.data(), now.data(), before.data(), rates,
+                    count, mean.data());
+        for (size_t p = 0; p < count; ++p) {
+          const int most = std::min(255, std::max<int>(limit[p], known[p] * rates.factor / 65536));
+          const int far = std::min(255, most * rates.most_of_moments / 256);
+          double distance = std::sqrt(double(squared[p])), share = 0;
+          if (!near[p] && squared[p] <= most * most) {
+            share = double(rates.share), ++calm;
+          } else if (now[p] && !before[p]) {
+            share = double(rates.share_of_moments), ++moments;
+            distance = std::min<double>(distance, far);
+          } else {
+            ++others;
+          }
+          distance = std::min<double>(distance, kMostMeanDistance);
+          // Rounded, from floats.
+          ASSERT_NEAR(mean[p], known[p] + share * (256 * distance - known[p]), 0.51) << p;
+        }
+      }
+  });
+  EXPECT_GT(calm, 50u);
+  EXPECT_GT(moments, 50u);
+  EXPECT_GT(others, 50u);
 }
 
 TEST(Specks, AreCountedByFlooding) {
