@@ -24,15 +24,16 @@ constexpr int kRunUnit = 32, kLongestRun = 256;
 
 int in_256ths(double value) { return static_cast<int>(std::lround(256 * value)); }
 
-// Whether any sample of a mask is set.
-bool differs(const uint8_t* mask, int count) {
+// Copies a mask; whether any sample of it is set.
+bool copy_if_any(const uint8_t* mask, int count, uint8_t* out) {
   uint64_t any = 0;
   int p = 0;
   for (uint64_t eight; p + 8 <= count; p += 8) {
     std::memcpy(&eight, mask + p, 8);
+    std::memcpy(out + p, &eight, 8);
     any |= eight;
   }
-  for (; p < count; ++p) any |= mask[p];
+  for (; p < count; ++p) any |= out[p] = mask[p];
   return any != 0;
 }
 
@@ -46,13 +47,12 @@ void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restr
   for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
 }
 
-// Moves what is set in `what` from the mask to `taken`.
+// Takes what is set in `what` out of the mask; where it was set, sets `taken`, or null.
 void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask,
               uint8_t* __restrict taken) {
-  for (int p = 0; p < count; ++p) {
-    taken[p] = what[p] & mask[p];
-    mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
-  }
+  if (taken)
+    for (int p = 0; p < count; ++p) taken[p] |= what[p] & mask[p];
+  for (int p = 0; p < count; ++p) mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
 }
 
 }  // namespace
@@ -193,13 +193,13 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
-  if (shadows_ == Shadows::marked) std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
   in_bands(shape_.height, parts, [&](int first, int size) { compare(first, size); });
   if (now_.means)
     in_bands(shape_.height, parts, [&](int first, int size) { compare_means(first, size); });
   // The second frame is the first one that can differ from what was there before: it is looked at
   // again once it is known what moves in it.
   for (int looks = now_.textures && texture_.frames() == 1 ? 2 : 1; looks > 0; --looks) {
+    if (shadows_ == Shadows::marked) std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
     // A row of cells is at most so much work more than another.
     in_bands(grid.rows, parts > 1 ? grid.rows : 1, [&](int first, int size) {
       for (int row = first; row < first + size; ++row) explain(row);
@@ -276,40 +276,40 @@ void Decision::explain(int grid_row) {
   for (int col = 0; col < grid.cols; ++col) moving |= moves(first_cell + static_cast<size_t>(col));
   for (int y = grid.top(grid_row); y < grid.top(grid_row + 1); ++y) {
     const uint8_t* const differing = differing_row(y);
-    std::memcpy(foreground_row(y), differing, static_cast<size_t>(shape_.width));
+    uint8_t* const foreground = foreground_row(y);
     int col = 0;
     const auto busy = [&](int left) {
       const int right = std::min(left + kRunUnit, shape_.width);
-      if (differs(differing + left, right - left)) return true;
-      if (!moving) return false;
-      int at = col;
-      while (grid.left(at + 1) <= left) ++at;
-      for (; at < grid.cols && grid.left(at) < right; ++at)
-        if (moves(first_cell + static_cast<size_t>(at))) return true;
-      return false;
-    };
-    for (int left = 0; left < shape_.width;) {
-      if (!busy(left)) {
-        left += kRunUnit;
-        continue;
-      }
-      int right = left + kRunUnit;
-      while (right < std::min(left + kLongestRun, shape_.width) && busy(right)) right += kRunUnit;
+      bool any = copy_if_any(differing + left, right - left, foreground + left);
+      if (!moving) return any;
       while (grid.left(col + 1) <= left) ++col;
-      explain_run(y, left, std::min(right, shape_.width), grid_row, col);
-      left = right;
+      for (int at = col; at < grid.cols && grid.left(at) < right; ++at)
+        any |= moves(first_cell + static_cast<size_t>(at));
+      return any;
+    };
+    int first = -1;  // of the columns that wait to be looked at
+    for (int left = 0; left < shape_.width; left += kRunUnit) {
+      const bool any = busy(left);
+      if (first >= 0 && (!any || left - first == kLongestRun)) {
+        explain_run(y, first, left, grid_row);
+        first = -1;
+      }
+      if (any && first < 0) first = left;
     }
-    repeat_border(foreground_row(y));
+    if (first >= 0) explain_run(y, first, shape_.width, grid_row);
+    repeat_border(foreground);
   }
 }
 
-// Columns left .. right - 1 of a row of pixels; `col` is the first one's cell.
-void Decision::explain_run(int y, int left, int right, int grid_row, int col) {
+// Columns left .. right - 1 of a row of pixels.
+void Decision::explain_run(int y, int left, int right, int grid_row) {
   const Grid& grid = texture_.grid();
   const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
   // Where nothing moves, a few rows are enough.
   const bool sampled = now_.textures && texture_.samples(y);
   bool moving = false;
+  int col = 0;
+  while (grid.left(col + 1) <= left) ++col;
   for (int at = col; at < grid.cols && grid.left(at) < right; ++at)
     moving |= moves(first_cell + static_cast<size_t>(at));
   Run run(y, left, right - left);
@@ -325,7 +325,13 @@ void Decision::explain_run(int y, int left, int right, int grid_row, int col) {
   const uint8_t* const differing = differing_row(y) + left;
   uint8_t* const foreground = foreground_row(y) + left;
   uint16_t* const noise = noise_.row(y) + left;
-  for (int p = 0; p < run.count; ++col) {
+  const int factor = in_256ths(constants().mean_distances),
+            of_textures = in_256ths(constants().means_of_textures);
+  if (!moving) {
+    if (!now_.frame.fixed) raise_limit(noise, factor, static_cast<size_t>(run.count), run.limit);
+    keep_beyond(run.own, run.limit, static_cast<size_t>(run.count), foreground);
+  }
+  for (int p = 0; p < run.count && (moving || sampled); ++col) {
     const int end = std::min(run.count, grid.left(col + 1) - left);
     const auto size = static_cast<size_t>(end - p);
     const size_t cell = first_cell + static_cast<size_t>(col);
@@ -335,12 +341,11 @@ void Decision::explain_run(int y, int left, int right, int grid_row, int col) {
     if (moves(cell)) {
       uint8_t limit[kLongestRun];
       std::copy_n(run.limit + p, size, limit);
-      raise_limit(noise + p, in_256ths(constants().means_of_textures), size, limit);
+      raise_limit(noise + p, of_textures, size, limit);
       keep_beyond(run.nearest + p, limit, size, foreground + p);
       learn_distance(run.nearest + p, size, texture_.share(cell), noise + p);
-    } else {
-      if (!now_.frame.fixed)
-        raise_limit(noise + p, in_256ths(constants().mean_distances), size, run.limit + p);
+    } else if (moving) {
+      raise_limit(noise + p, factor, size, run.limit + p);
       keep_beyond(run.own + p, run.limit + p, size, foreground + p);
     }
     p = end;
@@ -384,15 +389,22 @@ void Decision::look_around(Run* run) {
 
 void Decision::leave_shadows(const Run& run) {
   constexpr auto kMost = static_cast<int>(kShadingRun);
-  for (int first = 0; first < run.count; first += kMost) {
-    const int left = run.left + first, size = std::min(kMost, run.count - first);
-    uint8_t* const foreground = foreground_row(run.y) + left;
-    if (!std::memchr(foreground, 255, static_cast<size_t>(size))) continue;
-    const Lit lit(*this, run.y, left, size);
+  uint8_t* const foreground = foreground_row(run.y) + run.left;
+  uint8_t* const marks =
+      shadows_ == Shadows::marked ? of_.shaded.data() + shape_.first(run.y) + run.left : nullptr;
+  for (int first = 0; first < run.count;) {
+    const void* const next =
+        std::memchr(foreground + first, 255, static_cast<size_t>(run.count - first));
+    if (!next) return;
+    first = static_cast<int>(static_cast<const uint8_t*>(next) - foreground);
+    // Whole ones are quicker.
+    const int at = std::clamp(run.count - kMost, 0, first), size = std::min(kMost, run.count - at);
+    const Lit lit(*this, run.y, run.left + at, size);
     uint8_t shaded[kMost];
-    find_shaded(lit.rows, black_, foreground, run.limit + first, constants().light,
+    find_shaded(lit.rows, black_, foreground + at, run.limit + at, constants().light,
                 static_cast<size_t>(size), shaded);
-    take_out(shaded, size, foreground, of_.shaded.data() + shape_.first(run.y) + left);
+    take_out(shaded, size, foreground + at, marks ? marks + at : nullptr);
+    first = at + size;
   }
 }
 
@@ -435,7 +447,6 @@ void Decision::learn(int first_row, int row_count) {
       return of_.mask.data() + shape_.first(std::clamp(at, 0, shape_.height - 1));
     };
     const uint8_t* const rows[3] = {row_of(y - near), row_of(y), row_of(y + near)};
-    int col = 0;
     for (int left = 0; left < shape_.width; left += kLongestRun) {
       Run run(y, left, std::min(kLongestRun, shape_.width - left));
       look_at(&run);
@@ -449,22 +460,17 @@ void Decision::learn(int first_row, int row_count) {
           column[p] = rows[0][at] | rows[1][at] | rows[2][at];
         }
       widen(column + near, run.count, near, wide);
-      // Textures that move have learnt already; what is between them is learnt from.
-      for (int p = 0; p < run.count;) {
-        int end = p;
-        for (; end < run.count && !moves(first_cell + static_cast<size_t>(col));) {
-          end = std::min(run.count, grid.left(col + 1) - left);
-          if (left + end == grid.left(col + 1)) ++col;
-          if (col == grid.cols) break;
-        }
-        if (end > p)
-          noise_.learn(y, static_cast<size_t>(left + p), static_cast<size_t>(end - p), run.own + p,
-                       run.limit + p, wide + p, row_of(y) + left + p);
-        p = end;
-        if (p == run.count) break;
-        p = std::min(run.count, grid.left(col + 1) - left);
-        if (left + p == grid.left(col + 1)) ++col;
+      uint8_t now[kLongestRun];
+      std::copy_n(rows[1] + left, run.count, now);
+      // Textures that move have learnt already.
+      for (int col = 0; col < grid.cols; ++col) {
+        if (!moves(first_cell + static_cast<size_t>(col))) continue;
+        const int begin = std::max(grid.left(col) - left, 0),
+                  end = std::min(grid.left(col + 1) - left, run.count);
+        for (int p = begin; p < end; ++p) wide[p] = 255, now[p] = 0;
       }
+      noise_.learn(y, static_cast<size_t>(left), static_cast<size_t>(run.count), run.own, run.limit,
+                   wide, now);
     }
   }
 }

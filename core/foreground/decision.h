@@ -109,7 +109,7 @@ class Decision {
   void compare(int first_row, int row_count);
   void compare_means(int first_row, int row_count);
   void explain(int grid_row);
-  void explain_run(int y, int left, int right, int grid_row, int col);
+  void explain_run(int y, int left, int right, int grid_row);
   void look_at(Run* run);
   void look_around(Run* run);
   void leave_shadows(const Run& run);
