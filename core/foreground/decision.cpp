@@ -4,9 +4,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/foreground/mask_runs.h"
+#include "core/foreground/vote.h"
 #include "core/passes/bands.h"
 #include "core/passes/distance.h"
-#include "core/passes/majority.h"
 #include "core/passes/mean_distance.h"
 #include "core/passes/residual.h"
 #include "core/passes/sampling.h"
@@ -19,41 +20,10 @@ namespace {
 constexpr size_t kPixelsPerPart = 65536;
 // Pixels at most so far from foreground may say nothing of noise.
 constexpr int kMostNear = 16;
-// Runs of pixels that are looked at together.
-constexpr int kRunUnit = 32, kLongestRun = 256;
+// Pixels that are looked at together, at most: whole blocks.
+constexpr int kLongestRun = 8 * kMaskBlock;
 
 int in_256ths(double value) { return static_cast<int>(std::lround(256 * value)); }
-
-// Copies a mask; whether any sample of it is set.
-bool copy_if_any(const uint8_t* mask, int count, uint8_t* out) {
-  uint64_t any = 0;
-  int p = 0;
-  for (uint64_t eight; p + 8 <= count; p += 8) {
-    std::memcpy(&eight, mask + p, 8);
-    std::memcpy(out + p, &eight, 8);
-    any |= eight;
-  }
-  for (; p < count; ++p) any |= out[p] = mask[p];
-  return any != 0;
-}
-
-void either(const uint8_t* __restrict a, const uint8_t* __restrict b, const uint8_t* __restrict c,
-            int count, uint8_t* __restrict out) {
-  for (int p = 0; p < count; ++p) out[p] = a[p] | b[p] | c[p];
-}
-
-// Whether the mask is set at a sample, or `wide` samples to the left or to the right of it.
-void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restrict out) {
-  for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
-}
-
-// Takes what is set in `what` out of the mask; where it was set, sets `taken`, or null.
-void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask,
-              uint8_t* __restrict taken) {
-  if (taken)
-    for (int p = 0; p < count; ++p) taken[p] |= what[p] & mask[p];
-  for (int p = 0; p < count; ++p) mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
-}
 
 }  // namespace
 
@@ -83,8 +53,11 @@ struct Decision::Around {
         x[at] = samples + left;
         if (!at_edge) continue;
         // The border's pixels stand for those outside.
-        for (int p = 0; p < count + 2 * kReach; ++p)
-          inside_[at][p] = samples[std::clamp(left + p - kReach, 0, all.shape_.width - 1)];
+        const int begin = std::max(left - kReach, 0),
+                  end = std::min(left + count + kReach, all.shape_.width);
+        uint8_t* const first = std::fill_n(inside_[at], begin - (left - kReach), samples[0]);
+        uint8_t* const last = std::copy(samples + begin, samples + end, first);
+        std::fill_n(last, left + count + kReach - end, samples[end - 1]);
         x[at] = inside_[at] + kReach;
       }
     }
@@ -132,10 +105,6 @@ struct Decision::Lit {
   uint8_t copies_[2 * kChannels + 1][kShadingAlong][kMost + 2 * kShadingReach];
 };
 
-int voting_reach(int width, int height) {
-  return std::min(kMostReach, std::min(width, height) / 120);
-}
-
 Decision::Shape::Shape(int width_, int height_, bool votes)
     : width(width_),
       height(height_),
@@ -176,39 +145,48 @@ void Decision::level(int y, const uint8_t* out[3]) const {
   for (size_t c = 0; c < kChannels; ++c) out[c] = of_.level[c].data() + shape_.offset(y);
 }
 
+// In as many bands, on the pool's threads.
+template <typename Band>
+void Decision::in_bands(int length, int bands, Band band) {
+  if (now_.pool && bands > 1)
+    for_bands(*now_.pool, length, bands, [&](int first, int size, size_t) { band(first, size); });
+  else
+    band(0, length);
+}
+
 void Decision::decide(const Comparison& frame, Pool* pool) {
-  const Grid& grid = texture_.grid();
-  // Fewer parts than rows, so that each has some.
-  const int parts = static_cast<int>(
-      std::clamp<size_t>(shape_.pixels() / kPixelsPerPart, 1, static_cast<size_t>(grid.rows)));
-  const auto in_bands = [&](int length, int count, auto band) {
-    if (pool && count > 1)
-      for_bands(*pool, length, count, [&](int first, int size, size_t) { band(first, size); });
-    else
-      band(0, length);
-  };
   now_.frame = frame;
+  now_.pool = pool;
   // Without limits of pixels, ghosts look like noise, and like textures.
   now_.means = steps_.smooth && !frame.fixed && frame.limits && frame.threshold > constants().noisy;
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
-  in_bands(shape_.height, parts, [&](int first, int size) { compare(first, size); });
-  if (now_.means)
-    in_bands(shape_.height, parts, [&](int first, int size) { compare_means(first, size); });
-  // The second frame is the first one that can differ from what was there before: it is looked at
-  // again once it is known what moves in it.
-  for (int looks = now_.textures && texture_.frames() == 1 ? 2 : 1; looks > 0; --looks) {
-    if (shadows_ == Shadows::marked) std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
-    // A row of cells is at most so much work more than another.
-    in_bands(grid.rows, parts > 1 ? grid.rows : 1, [&](int first, int size) {
-      for (int row = first; row < first + size; ++row) explain(row);
-    });
-    if (now_.textures) texture_.end_frame(frame.x, looks == 1);
+  // Fewer parts than rows, so that each has some.
+  const Grid& grid = texture_.grid();
+  const int parts = static_cast<int>(
+      std::clamp<size_t>(shape_.pixels() / kPixelsPerPart, 1, static_cast<size_t>(grid.rows)));
+  look(parts);
+  if (now_.textures) {
+    // The second frame is the first one that can differ from what was there before: it is looked
+    // at again now that it is known what moves in it.
+    const bool again = texture_.frames() == 1;
+    texture_.end_frame(frame.x, !again);
+    if (again) {
+      clear_marks();
+      in_bands(grid.rows, parts, [&](int first, int size) {
+        for (int row = first; row < first + size; ++row) explain(row);
+      });
+      texture_.end_frame(frame.x);
+    }
   }
   const bool learns = steps_.noise && !frame.fixed;
   if (learns) noise_.remember(of_.mask.data());
-  in_bands(shape_.height, parts, [&](int first, int size) { vote(first, size); });
+  in_bands(shape_.height, parts, [&](int first, int size) {
+    vote({of_.foreground.data() + shape_.offset(0), shape_.stride, shape_.width, shape_.height,
+          shape_.reach},
+         first, size, of_.mask.data());
+  });
   if (steps_.specks && shape_.reach > 0) {
     const auto area = [&](double share) {
       return static_cast<size_t>(share * static_cast<double>(shape_.pixels()));
@@ -221,6 +199,38 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     noise_.end_frame();
   }
   ++frames_;
+}
+
+void Decision::clear_marks() {
+  if (shadows_ == Shadows::marked) std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
+}
+
+// What differs, and what of it is foreground. A row of cells is explained as soon as the rows of
+// pixels around it are known, which are still near then, but for those at the ends of bands.
+void Decision::look(int parts) {
+  clear_marks();
+  const Grid& grid = texture_.grid();
+  const int around = std::max(kShadingReach, shape_.margin);
+  const bool at_once = !now_.means && shape_.height / grid.rows >= around;
+  const auto soon = [&](int row, int first, int end) {
+    return at_once && (row > first || first == 0) && (row + 1 < end || end == grid.rows);
+  };
+  // Bands of one row have no middle.
+  const int bands = now_.pool ? std::min(parts, static_cast<int>(now_.pool->threads())) : 1;
+  in_bands(grid.rows, bands, [&](int first, int size) {
+    const int end = first + size;
+    for (int row = first; row < end; ++row) {
+      compare(grid.top(row), grid.top(row + 1) - grid.top(row));
+      if (row > first && soon(row - 1, first, end)) explain(row - 1);
+    }
+    if (soon(end - 1, first, end)) explain(end - 1);
+  });
+  if (now_.means)
+    in_bands(shape_.height, parts, [&](int first, int size) { compare_means(first, size); });
+  in_bands(grid.rows, bands, [&](int first, int size) {
+    for (int row = first; row < first + size; ++row)
+      if (!soon(row, first, first + size)) explain(row);
+  });
 }
 
 // L, and which pixels differ from it.
@@ -277,18 +287,16 @@ void Decision::explain(int grid_row) {
   for (int y = grid.top(grid_row); y < grid.top(grid_row + 1); ++y) {
     const uint8_t* const differing = differing_row(y);
     uint8_t* const foreground = foreground_row(y);
-    int col = 0;
     const auto busy = [&](int left) {
-      const int right = std::min(left + kRunUnit, shape_.width);
+      const int right = std::min(left + kMaskBlock, shape_.width);
       bool any = copy_if_any(differing + left, right - left, foreground + left);
-      if (!moving) return any;
-      while (grid.left(col + 1) <= left) ++col;
-      for (int at = col; at < grid.cols && grid.left(at) < right; ++at)
-        any |= moves(first_cell + static_cast<size_t>(at));
+      if (moving)
+        for (int at = texture_.col_of(left); at <= texture_.col_of(right - 1); ++at)
+          any |= moves(first_cell + static_cast<size_t>(at));
       return any;
     };
     int first = -1;  // of the columns that wait to be looked at
-    for (int left = 0; left < shape_.width; left += kRunUnit) {
+    for (int left = 0; left < shape_.width; left += kMaskBlock) {
       const bool any = busy(left);
       if (first >= 0 && (!any || left - first == kLongestRun)) {
         explain_run(y, first, left, grid_row);
@@ -308,11 +316,15 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
   // Where nothing moves, a few rows are enough.
   const bool sampled = now_.textures && texture_.samples(y);
   bool moving = false;
-  int col = 0;
-  while (grid.left(col + 1) <= left) ++col;
-  for (int at = col; at < grid.cols && grid.left(at) < right; ++at)
+  int col = texture_.col_of(left);
+  for (int at = col; at <= texture_.col_of(right - 1); ++at)
     moving |= moves(first_cell + static_cast<size_t>(at));
   Run run(y, left, right - left);
+  // The next row has something about here, too.
+  if (y + 1 < shape_.height) {
+    fetch(noise_.row(y + 1) + left, run.count);
+    if (now_.frame.limits) fetch(now_.frame.limits + shape_.first(y + 1) + left, run.count);
+  }
   look_at(&run);
   if (sampled || moving) look_around(&run);
   uint16_t moved[kLongestRun];
@@ -405,32 +417,6 @@ void Decision::leave_shadows(const Run& run) {
                 static_cast<size_t>(size), shaded);
     take_out(shaded, size, foreground + at, marks ? marks + at : nullptr);
     first = at + size;
-  }
-}
-
-void Decision::vote(int first_row, int row_count) {
-  const auto width = static_cast<size_t>(shape_.width);
-  uint8_t* out = of_.mask.data() + shape_.first(first_row);
-  if (shape_.reach == 0) {
-    for (int y = first_row; y < first_row + row_count; ++y, out += width)
-      std::memcpy(out, foreground_row(y), width);
-    return;
-  }
-  constexpr int kRows = 2 * kMostReach + 1;
-  alignas(64) uint8_t counts[kRows][kMaxRun];
-  for (size_t left = 0; left < width; left += kMaxRun) {
-    const size_t count = std::min(kMaxRun, width - left);
-    int counted = std::max(0, first_row - shape_.reach);
-    for (int y = first_row; y < first_row + row_count; ++y) {
-      for (const int end = std::min(shape_.height, y + shape_.reach + 1); counted < end; ++counted)
-        count_columns(foreground_row(counted) + left - shape_.reach, count, shape_.reach,
-                      counts[counted % kRows]);
-      const uint8_t* around[kRows];
-      for (int i = 0; i <= 2 * shape_.reach; ++i)
-        around[i] = counts[std::clamp(y + i - shape_.reach, 0, shape_.height - 1) % kRows];
-      vote_row(around, foreground_row(y) + left, count, shape_.reach,
-               of_.mask.data() + shape_.first(y) + left);
-    }
   }
 }
 

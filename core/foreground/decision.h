@@ -91,6 +91,7 @@ class Decision {
   // looked for.
   struct Now {
     Comparison frame = {};
+    Pool* pool = nullptr;
     bool means = false, textures = false;
     double threshold = 0;
   };
@@ -105,6 +106,10 @@ class Decision {
   uint8_t* foreground_row(int y) { return of_.foreground.data() + shape_.offset(y); }
   const DecisionConstants& constants() const { return steps_.constants; }
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
+  template <typename Band>
+  void in_bands(int length, int bands, Band band);
+  void clear_marks();
+  void look(int parts);
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
   void compare_means(int first_row, int row_count);
@@ -113,7 +118,6 @@ class Decision {
   void look_at(Run* run);
   void look_around(Run* run);
   void leave_shadows(const Run& run);
-  void vote(int first_row, int row_count);
   void learn(int first_row, int row_count);
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
@@ -131,11 +135,5 @@ class Decision {
   Now now_;
   Pictures of_;
 };
-
-// A pixel of a mask is overruled where three fifths of those at most so many rows and columns from
-// it are the other: 2, less in pictures whose short side is below 240 pixels, 0 (it decides alone)
-// below 120. Compression, and noise near the threshold, leave specks and holes of single pixels;
-// what is as narrow as they are goes with them.
-int voting_reach(int width, int height);
 
 }  // namespace qdmd

@@ -13,9 +13,10 @@ struct DecisionConstants {
   double mean_distances = 3.5;
   // The newest of a pixel's distances counts at least one in so many; there is one for every eighth
   // frame.
-  double noise_samples = 8;
-  // What comes for a moment counts at most so many limits.
-  double most_of_moments = 3;
+  double noise_samples = 16;
+  // What comes for a moment counts so many times, because it is new in about half of the frames in
+  // which it is there; and at most so many of the pixel's limits.
+  double weight_of_moments = 2, most_of_moments = 3;
   // Pixels at most so far from foreground, in pixels, say nothing of noise.
   double near_foreground = 4;
 
@@ -31,9 +32,9 @@ struct DecisionConstants {
   double nearer = 0.3;
   // Cells along the short side: objects of interest are about as large.
   double texture_cells = 10;
-
-  // A cell moves above these: share of pixels that differ, share of these that are explained, least
-  // share of pixels that differ by their average share.
+  // A cell moves above these: share of pixels that differ, shares of these that are explained and
+  // restless, least share of pixels that differ by their average share; and where the share of the
+  // last frame is below so many average ones.
   double differing = 0.02, explained = 0.3, restless = 0.08, always = 0.5, suddenly = 2;
   // Frames of averages, of recent shares, and in which the least share comes up to the recent one:
   // something that came and stays is told from what was always there for about so long.

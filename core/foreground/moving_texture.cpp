@@ -33,12 +33,18 @@ MovingTexture::MovingTexture(int width, int height, const DecisionConstants& con
     : constants_(constants),
       grid_(grid_of(width, height, constants)),
       row_step_(row_step_of(grid_)),
+      cols_(static_cast<size_t>(width)),
       cells_(grid_.cells()),
-      before_(before_size(grid_)) {}
+      before_(before_size(grid_)) {
+  for (int col = 0; col < grid_.cols; ++col)
+    std::fill(cols_.begin() + grid_.left(col), cols_.begin() + grid_.left(col + 1),
+              static_cast<uint16_t>(col));
+}
 
 uint64_t MovingTexture::bytes(int width, int height, const DecisionConstants& constants) {
   const Grid grid = grid_of(width, height, constants);
-  return grid.cells() * sizeof(Cell) + before_size(grid);
+  return grid.cells() * sizeof(Cell) + before_size(grid) +
+         static_cast<uint64_t>(width) * sizeof(uint16_t);
 }
 
 void MovingTexture::forget() {

@@ -33,6 +33,8 @@ class MovingTexture {
   static uint64_t bytes(int width, int height, const DecisionConstants& constants = {});
 
   const Grid& grid() const { return grid_; }
+  // The cell of a row of cells that has the pixel column.
+  int col_of(int x) const { return cols_[static_cast<size_t>(x)]; }
   // Begins afresh.
   void forget();
   // True where the cell moves.
@@ -71,6 +73,7 @@ class MovingTexture {
   DecisionConstants constants_;
   Grid grid_;
   int row_step_;
+  std::vector<uint16_t> cols_;
   int64_t frames_ = 0;
   std::vector<Cell> cells_;
   std::vector<uint8_t> before_;

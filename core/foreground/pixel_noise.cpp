@@ -10,6 +10,7 @@ PixelNoise::PixelNoise(int width, int height, const DecisionConstants& constants
     : width_(static_cast<size_t>(width)),
       height_(height),
       most_samples_(constants.noise_samples),
+      weight_of_moments_(constants.weight_of_moments),
       mean_(width_ * static_cast<size_t>(height)),
       before_((static_cast<size_t>(height) / kRows + 1) * width_) {
   rates_.factor = static_cast<int>(std::lround(256 * constants.mean_distances));
@@ -39,7 +40,8 @@ void PixelNoise::learn(int y, size_t left, size_t count, const uint16_t* squared
   rates.share =
       1 / static_cast<float>(std::min(static_cast<double>(frames_ / kRows + 1), most_samples_));
   // Nothing was remembered before the first frame.
-  rates.share_of_moments = frames_ > 0 ? 1 / static_cast<float>(most_samples_) : 0;
+  rates.share_of_moments =
+      frames_ > 0 ? static_cast<float>(std::min(weight_of_moments_ / most_samples_, 1.0)) : 0;
   learn_noise(squared, limit, near, now,
               before_.data() + static_cast<size_t>(y / kRows) * width_ + left, rates, count,
               row(y) + left);

@@ -41,7 +41,7 @@ class PixelNoise {
 
   size_t width_;
   int height_;
-  double most_samples_;
+  double most_samples_, weight_of_moments_;
   NoiseRates rates_;
   int64_t frames_ = 0;
   std::vector<uint16_t> mean_;

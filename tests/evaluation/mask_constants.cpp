@@ -35,6 +35,7 @@ std::vector<Constant> constants() {
   return {
       {"mean_distances", of(&All::mean_distances)},
       {"noise_samples", of(&All::noise_samples)},
+      {"weight_of_moments", of(&All::weight_of_moments)},
       {"most_of_moments", of(&All::most_of_moments)},
       {"near_foreground", of(&All::near_foreground)},
       {"noisy", of(&All::noisy)},
