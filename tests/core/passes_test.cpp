@@ -269,6 +269,60 @@ TEST(AbsoluteResidual, OfAnyCount) {
   });
 }
 
+// The largest integer whose square is at most `square`, at most 255.
+int whole_root(int square) {
+  const int root = static_cast<int>(std::lround(std::sqrt(square)));
+  return std::min(255, root * root > square ? root - 1 : root);
+}
+
+TEST(ResidualNorm, OfEveryNorm) {
+  on_every_target([] {
+    BeforeTheEdge<uint8_t> red(256), green(256), blue(256), white(256), norm(256), quarters(256);
+    std::fill(white.begin(), white.end(), static_cast<uint8_t>(255));
+    for (size_t p = 0; p < 256; ++p) blue[p] = static_cast<uint8_t>(p);
+    const uint8_t* const x[3] = {white.data(), green.data(), blue.data()};
+    BeforeTheEdge<uint8_t> zero(256);
+    std::fill(zero.begin(), zero.end(), static_cast<uint8_t>(0));
+    const uint8_t* const l[3] = {red.data(), white.data(), zero.data()};
+    for (int r = 0; r < 256; r += r < 72 ? 1 : 3) {
+      std::fill(red.begin(), red.end(), static_cast<uint8_t>(255 - r));
+      for (int g = 0; g <= r; ++g) {
+        std::fill(green.begin(), green.end(), static_cast<uint8_t>(255 - g));
+        residual_norm(x, l, 256, norm.data());
+        residual_norm(x, l, 256, quarters.data(), 4);
+        for (int b = 0; b < 256; ++b) {
+          const int square = r * r + g * g + b * b;
+          if (norm[static_cast<size_t>(b)] != whole_root(square) ||
+              quarters[static_cast<size_t>(b)] != whole_root(16 * square))
+            FAIL() << square;
+        }
+      }
+    }
+  });
+}
+
+TEST(ResidualNorm, OfAnyCount) {
+  std::mt19937 rng(208);
+  on_every_target([&] {
+    for (size_t count : kCounts) {
+      std::array<std::unique_ptr<BeforeTheEdge<uint8_t>>, 6> planes;
+      for (auto& plane : planes) {
+        plane = std::make_unique<BeforeTheEdge<uint8_t>>(count);
+        for (uint8_t& sample : *plane) sample = random_byte(rng);
+      }
+      BeforeTheEdge<uint8_t> norm(count);
+      const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
+      const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
+      residual_norm(x, l, count, norm.data());
+      for (size_t p = 0; p < count; ++p) {
+        int square = 0;
+        for (size_t c = 0; c < 3; ++c) square += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+        ASSERT_EQ(norm[p], whole_root(square));
+      }
+    }
+  });
+}
+
 // Pixels of three channels, frame and background.
 struct Pixels {
   std::vector<std::array<uint8_t, 6>> all;
