@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/passes/combine.h"
+#include "core/passes/median_network.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
 #include "tests/core/constants.h"
@@ -22,6 +23,38 @@ constexpr uint8_t kCanary = 0x5A;
 constexpr int kWidths[] = {1, 3, 15, 16, 17, 33, 63, 64, 65, 255};
 
 uint8_t random_byte(std::mt19937& rng) { return static_cast<uint8_t>(rng() >> 13); }
+
+// ---- Medians ----
+
+template <size_t kMost>
+void expect_middle(std::vector<int> samples) {
+  const MedianNetwork<kMost> network(samples.size());
+  std::vector<int> sorted = samples;
+  std::sort(sorted.begin(), sorted.end());
+  for (const auto& [smaller, larger] : network)
+    if (samples[larger] < samples[smaller]) std::swap(samples[larger], samples[smaller]);
+  ASSERT_EQ(samples[network.lower_middle()], sorted[(sorted.size() - 1) / 2]) << sorted.size();
+  ASSERT_EQ(samples[network.upper_middle()], sorted[sorted.size() / 2]) << sorted.size();
+}
+
+// What is right for all sequences of zeros and ones is for all others (Knuth, vol. 3, 5.3.4).
+TEST(MedianNetwork, PutsTheMiddleOfAnySamplesInPlace) {
+  for (size_t count = 1; count <= 16; ++count)
+    for (unsigned ones = 0; ones < 1u << count; ++ones) {
+      std::vector<int> samples(count);
+      for (size_t i = 0; i < count; ++i) samples[i] = static_cast<int>(ones >> i & 1);
+      expect_middle<16>(samples);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+  std::mt19937 rng(209);
+  for (size_t count = 1; count <= 64; ++count)
+    for (int turn = 0; turn < 200; ++turn) {
+      std::vector<int> samples(count);
+      for (int& sample : samples) sample = static_cast<int>(rng() % (turn % 2 ? 2 : 1000));
+      expect_middle<64>(samples);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+}
 
 // ---- Packed pixels ----
 
