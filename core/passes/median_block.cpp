@@ -25,7 +25,7 @@ constexpr size_t kUnit = 64;
 
 // The medians of rows of `count` samples, a multiple of kUnit; the mean of the middle two, rounded
 // up, where there are two. Leaves the samples in another order.
-void take_median(const MedianNetwork<32>& network, size_t count, uint8_t (*samples)[kRun],
+void take_median(const MedianNetwork<16>& network, size_t count, uint8_t (*samples)[kRun],
                  uint8_t* median) {
   const hn::CappedTag<uint8_t, kUnit> d;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -57,7 +57,7 @@ namespace {
 HWY_EXPORT(take_median);
 HWY_EXPORT(scale_row);
 
-constexpr size_t kRun = kMedianBlock, kUnit = 64, kMost = 32;
+constexpr size_t kRun = kMedianBlock, kUnit = 64, kMost = 16;
 static_assert(kMedianFrames <= kMost);
 using Network = MedianNetwork<kMost>;
 

@@ -480,7 +480,7 @@ Median median_of(const Stack& stack, int threads) {
 TEST(MedianPicture, IsTheMiddleOfEveryNumberOfFrames) {
   on_every_target([] {
     std::mt19937 rng(41);
-    // Cells have 1 to 31 frames, then more that are thinned; one has a single row of wide cells.
+    // Cells have one frame to all, of which many are thinned; one has a single row of wide cells.
     for (const auto& [width, height, count] :
          {std::array{60, 50, 31}, {64, 49, 40}, {70, 60, 90}, {331, 2, 7}, {1, 1, 1}}) {
       SCOPED_TRACE(testing::Message() << width << " x " << height << ", " << count);
