@@ -145,7 +145,8 @@ void add_all(const Size& size) {
       },
       [](Solve& solve) {
         std::vector<float> density(solve.grid.cells() * size_t(solve.size.window));
-        patch_density(solve.grid, solve.cells, solve.size.window, &solve.pool, density.data());
+        PatchFrames(solve.grid, solve.cells, solve.size.window, &solve.pool)
+            .density(solve.size.window, &solve.pool, density.data());
         benchmark::DoNotOptimize(density.data());
       });
   add("find_stable_frames", size, "ns/cell", all_cells, [](Solve& solve) {

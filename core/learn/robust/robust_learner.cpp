@@ -67,7 +67,7 @@ uint64_t RobustLearner::bytes(int window_size, int capacity, Models models, int 
   // decomposition; the combination.
   const uint64_t start = GridFrames::bytes(grid_, window_size) +
                          GridFrames::bytes(grid_, static_cast<int>(looks)) +
-                         std::max<uint64_t>(levels(2 * looks), pixels());
+                         std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
   return kept + made +

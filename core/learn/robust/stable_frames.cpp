@@ -166,27 +166,44 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
 
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
 // too little of it is seen in any frame: the camera moved, or the scene is another.
-bool add_recollection(const Grid& grid, const GridFrames& frames, int count,
-                      const Recollection& earlier, Pool* pool, std::vector<float>* density) {
-  const size_t cells = grid.cells();
-  std::vector<float> alike(density->size());
-  patch_distance(grid, frames, count, std::vector<int>(cells, count).data(), pool, alike.data());
-  for (float& a : alike) a = std::max(0.0f, 1 - a / kSimilar);
+bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recollection& earlier,
+                      std::vector<float>* density) {
+  std::vector<float> alike(cells);
   float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
   std::fill_n(of_earlier, cells, 0.0f);
-  for (int t = 0; t < count; ++t)
-    for (size_t cell = 0; cell < cells; ++cell)
-      of_earlier[cell] += alike[static_cast<size_t>(t) * cells + cell];
+  for (int t = 0; t < count; ++t) {
+    patches->alike(t, count, alike.data());
+    for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += alike[cell];
+  }
   const auto seen = std::count_if(of_earlier, of_earlier + cells,
                                   [](float frames_alike) { return frames_alike > 0; });
   if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
-  for (int t = 0; t < count; ++t)
-    for (size_t cell = 0; cell < cells; ++cell) {
-      const size_t at = static_cast<size_t>(t) * cells + cell;
-      (*density)[at] += earlier.weight[cell] * alike[at];
-    }
+  for (int t = 0; t < count; ++t) {
+    patches->alike(t, count, alike.data());
+    float* of_frame = density->data() + static_cast<size_t>(t) * cells;
+    for (size_t cell = 0; cell < cells; ++cell)
+      of_frame[cell] += earlier.weight[cell] * alike[cell];
+  }
   for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += earlier.weight[cell];
   return true;
+}
+
+// How far a frame that shows the background may be: distance, of all frames less one. scratch: as
+// many.
+float limit_of(std::span<const float> distance, size_t left_out, std::span<float> scratch) {
+  const size_t others = distance.size() - (left_out < distance.size() ? 1 : 0);
+  const auto nearest = static_cast<size_t>(kNearest * static_cast<double>(others - 1));
+  constexpr float kLeast = kSimilar / 2;
+  // Where enough frames are near, it is no matter how near.
+  size_t near = 0;
+  for (float d : distance) near += kNear * d <= kLeast ? 1 : 0;
+  if (left_out < distance.size() && kNear * distance[left_out] <= kLeast) --near;
+  if (near > nearest) return kLeast;
+  std::copy(distance.begin(), distance.end(), scratch.begin());
+  if (left_out < distance.size()) std::swap(scratch[left_out], scratch[others]);
+  std::nth_element(scratch.begin(), scratch.begin() + static_cast<ptrdiff_t>(nearest),
+                   scratch.begin() + static_cast<ptrdiff_t>(others));
+  return std::max(kLeast, kNear * scratch[nearest]);
 }
 
 }  // namespace
@@ -195,45 +212,59 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
                                 const Recollection* earlier, Pool* pool) {
   const size_t cells = grid.cells();
   std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
-  patch_density(grid, frames, count, pool, density.data());
-  if (earlier && !add_recollection(grid, frames, count, *earlier, pool, &density)) {
-    earlier = nullptr;
-    density.resize(cells * static_cast<size_t>(count));
+  {
+    PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
+    patches.density(count, pool, density.data());
+    if (earlier && !add_recollection(cells, &patches, count, *earlier, &density)) {
+      earlier = nullptr;
+      density.resize(cells * static_cast<size_t>(count));
+    }
   }
   const int looks = count + (earlier ? 1 : 0);
-  std::vector<int> from(cells);
-  for (size_t cell = 0; cell < cells; ++cell) {
-    from[cell] = 0;
-    for (int t = 1; t < looks; ++t)
-      if (density[static_cast<size_t>(t) * cells + cell] >
-          density[static_cast<size_t>(from[cell]) * cells + cell])
-        from[cell] = t;
+  std::vector<int> from(cells, 0);
+  std::vector<float> most(density.begin(), density.begin() + static_cast<ptrdiff_t>(cells));
+  for (int t = 1; t < looks; ++t) {
+    const float* of_frame = density.data() + static_cast<size_t>(t) * cells;
+    for (size_t cell = 0; cell < cells; ++cell) {
+      from[cell] = of_frame[cell] > most[cell] ? t : from[cell];
+      most[cell] = std::max(most[cell], of_frame[cell]);
+    }
   }
   compare_contours(grid, frames, count, density, &from);
 
-  std::vector<float>& distance = density;
+  std::vector<float>().swap(density);
+  std::vector<uint16_t> distance(cells * static_cast<size_t>(looks));
   patch_distance(grid, frames, looks, from.data(), pool, distance.data());
   StableFrames result;
   result.of_cell = FrameLists(cells, looks);
   result.limit.resize(cells);
-  std::vector<float> sorted(static_cast<size_t>(count));
-  for (size_t cell = 0; cell < cells; ++cell) {
-    // A frame is not its own neighbour, but of two it would be wrong to trust the other.
-    size_t others = 0;
-    for (int t = 0; t < count; ++t)
-      if (t != from[cell] || count <= 2)
-        sorted[others++] = distance[static_cast<size_t>(t) * cells + cell];
-    const auto nearest =
-        sorted.begin() + static_cast<ptrdiff_t>(kNearest * static_cast<double>(others - 1));
-    std::nth_element(sorted.begin(), nearest, sorted.begin() + static_cast<ptrdiff_t>(others));
-    float limit = std::max(kSimilar / 2, kNear * *nearest);
-    // No frame need show what an earlier window did.
-    if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
-    result.limit[cell] = limit;
-    for (int t = 0; t < looks; ++t)
-      if (distance[static_cast<size_t>(t) * cells + cell] <= limit) result.of_cell.add(cell, t);
-  }
+  const auto all = static_cast<size_t>(count), cols = static_cast<size_t>(grid.cols);
+  const size_t room = static_cast<size_t>(looks) + all;
+  std::vector<float> rooms(room * pool->threads());
+  pool->run(static_cast<size_t>(grid.rows), [&](size_t row, size_t worker) {
+    float *of_cell = rooms.data() + worker * room, *scratch = of_cell + looks;
+    for (size_t col = 0; col < cols; ++col) {
+      const size_t cell = row * cols + col;
+      const auto steps =
+          static_cast<float>(kChannels * kStepsPerLevel *
+                             patch_cells(grid, static_cast<int>(row), static_cast<int>(col)));
+      for (size_t t = 0; t < static_cast<size_t>(looks); ++t)
+        of_cell[t] = static_cast<float>(distance[cell * static_cast<size_t>(looks) + t]) / steps;
+      // A frame is not its own neighbour, but of two it would be wrong to trust the other.
+      const auto left_out = count > 2 ? static_cast<size_t>(from[cell]) : all;
+      float limit = limit_of({of_cell, all}, left_out, {scratch, all});
+      // No frame need show what an earlier window did.
+      if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
+      result.limit[cell] = limit;
+      result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
+    }
+  });
   return result;
+}
+
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks) {
+  return std::max(sizeof(float) * looks * grid.cells() + PatchFrames::bytes(grid, looks),
+                  patch_distance_bytes(grid, looks));
 }
 
 }  // namespace qdmd

@@ -28,6 +28,18 @@ class FrameLists {
   void add(size_t cell, int frame) {
     frames_[cell * most_ + counts_[cell]++] = static_cast<uint16_t>(frame);
   }
+  // Makes it the list of frames t < `most` with shows(t).
+  template <typename Shows>
+  void take(size_t cell, Shows shows) {
+    uint16_t* list = frames_.data() + cell * most_;
+    size_t count = 0;
+    // Without a branch that nobody foresees.
+    for (size_t t = 0; t < most_; ++t) {
+      list[count] = static_cast<uint16_t>(t);
+      count += shows(t) ? 1 : 0;
+    }
+    counts_[cell] = static_cast<uint16_t>(count);
+  }
 
  private:
   size_t most_ = 0;
@@ -58,5 +70,7 @@ struct Recollection {
 // frame's region fits its surroundings better: what stands still for long shows by its contour.
 StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
                                 const Recollection* earlier, Pool* pool);
+// The memory that it takes while it looks for them.
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks);
 
 }  // namespace qdmd
