@@ -85,24 +85,31 @@ TEST(Cells, AreFewInThinPictures) {
 }
 
 TEST(Cells, MeansAreThoseOfTheirPixels) {
-  std::mt19937 rng(5);
-  for (const auto& [width, height] : {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}}) {
-    const Grid grid(width, height);
-    const auto plane = random_picture(static_cast<size_t>(width * height), rng);
-    std::vector<float> means(grid.cells(), -1);
-    cell_means(grid, plane.data(), means.data());
-    for (int row = 0; row < grid.rows; ++row)
-      for (int col = 0; col < grid.cols; ++col) {
-        double sum = 0;
-        int count = 0;
-        for (int y = grid.top(row); y < grid.top(row + 1); ++y)
-          for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
-            sum += plane[static_cast<size_t>(y * width + x)];
-        // A sum of integers: exact.
-        ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
-                  static_cast<float>(sum / count));
-      }
-  }
+  // Thin pictures have cells of more rows than 16 bits can sum, and more columns than are summed
+  // together.
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}, {3, 200000}, {200000, 3}})
+    on_every_target([&, width = width, height = height] {
+      std::mt19937 rng(5);
+      const Grid grid(width, height);
+      const auto pixels = static_cast<size_t>(width * height);
+      BeforeTheEdge<uint8_t> plane(pixels);
+      for (uint8_t& sample : plane)
+        sample = static_cast<uint8_t>(height > 90 ? 255 - rng() % 9 : rng());
+      std::vector<float> means(grid.cells(), -1);
+      cell_means(grid, plane.data(), means.data());
+      for (int row = 0; row < grid.rows; ++row)
+        for (int col = 0; col < grid.cols; ++col) {
+          double sum = 0;
+          int count = 0;
+          for (int y = grid.top(row); y < grid.top(row + 1); ++y)
+            for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
+              sum += plane[static_cast<size_t>(y * width + x)];
+          // A sum of integers: exact.
+          ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
+                    static_cast<float>(sum / count));
+        }
+    });
 }
 
 // ---- Patches ----
