@@ -16,6 +16,9 @@ constexpr float kGrowth = 1.3f, kShare = 0.1f;
 constexpr float kLeastGain = 0.01f;
 // Relative change of light that needs no following: less is a part of the noise.
 constexpr float kStill = 0.03f;
+// Light that is followed from frame to frame must make so many of the cells agree, and so many
+// more.
+constexpr float kLeastFollowed = 0.25f, kFollowed = 0.05f;
 
 float median(std::vector<float>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
@@ -126,10 +129,57 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
   return without_noise(gain_over(frames, frame, background, reference, scratch));
 }
 
+namespace {
+
+// The mean over frames 0 .. count - 1 of the share of cells that agree with `reference`.
+float mean_agreement(const GridFrames& frames, int count, const std::vector<Gain>& gains,
+                     const GridFrames& reference) {
+  const float* const of_reference[3] = {reference.plane(0, 0), reference.plane(0, 1),
+                                        reference.plane(0, 2)};
+  float sum = 0;
+  for (int t = 0; t < count; ++t) {
+    const float* const of_frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+    sum += agreement(of_frame, of_reference, frames.cells(), gains[static_cast<size_t>(t)]);
+  }
+  return sum / static_cast<float>(count);
+}
+
+// What changes from each frame to the next, added up: most of a picture is the same in both,
+// people included, even where no two frames far apart share much of the background. False, and
+// nothing is changed, where frames do not agree better for it.
+bool follow_light(const GridFrames& frames, int count, LightScratch* scratch,
+                  std::vector<Gain>* gains) {
+  std::vector<Gain> followed(gains->size(), kSameLight);
+  bool changes = false;
+  for (int t = 1; t < count; ++t) {
+    const float* const now[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+    const float* const before[3] = {frames.plane(t - 1, 0), frames.plane(t - 1, 1),
+                                    frames.plane(t - 1, 2)};
+    const Gain step = shared_gain(now, before, frames.cells(), scratch);
+    Gain& gain = followed[static_cast<size_t>(t)];
+    for (size_t c = 0; c < kChannels; ++c)
+      gain[c] = std::max(kLeastGain, followed[static_cast<size_t>(t) - 1][c] * step[c]);
+    changes |= std::abs(std::log(brightness(gain))) > kStill;
+  }
+  if (!changes) return false;
+  const float before = mean_agreement(frames, count, *gains, median_frame(frames, count, *gains));
+  const float after =
+      mean_agreement(frames, count, followed, median_frame(frames, count, followed));
+  if (after < std::max(kLeastFollowed, before + kFollowed)) return false;
+  *gains = std::move(followed);
+  return true;
+}
+
+}  // namespace
+
 std::vector<Gain> light_of(const GridFrames& frames, int count) {
   std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
   if (count < 2) return gains;
   LightScratch scratch(frames.cells());
+  if (follow_light(frames, count, &scratch, &gains)) {
+    settle_light(&gains);
+    return gains;
+  }
   // The second reference is sharper where light changed.
   for (int round = 0; round < 2; ++round) {
     const GridFrames reference = median_frame(frames, count, gains);
