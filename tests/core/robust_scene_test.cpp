@@ -82,7 +82,7 @@ TEST(RobustScenes, AreNoWorseThanTheMedian) {
     for (const char* text : {"default", "noise=3", "low-rate=5", "abandon", "remove", "shadow",
                              "camouflage", "bootstrap", "exposure"}) {
       const Errors errors = errors_of(text, iterations);
-      EXPECT_LT(errors.mean, errors.median + 0.01) << text;
+      EXPECT_LT(errors.mean, errors.median + 0.01) << text << " " << iterations;
     }
 }
 

@@ -201,9 +201,16 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
     const Gain gain = light_over(earlier_.cells(), 0, here, 0, &scratch);
     choose(earlier_.cells(), 0, count, earlier_.picture(gain));
     recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
+    recollection.older_frames = old;
   }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
                                room_.pool);
+  if (stable_.another_scene && old > 0) {
+    memory_.forget();
+    earlier_.forget();
+    start(snapshots);
+    return;
+  }
   start_frames_ = count;
 
   uint8_t* background[kChannels];
@@ -346,16 +353,14 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
 std::vector<Gain> RobustLearner::gains_of_frames() const {
   if (stride_ == 1) return gains_;
   std::vector<Gain> gains(static_cast<size_t>(snapshots_->size()), kSameLight);
-  const bool lit = std::any_of(gains_.begin(), gains_.end(), is_lit);
-  LightScratch scratch(grid_.cells());
-  for (int t = 0; lit && t < snapshots_->size(); ++t) {
+  for (int t = 0; t < snapshots_->size(); ++t) {
     Gain& gain = gains[static_cast<size_t>(t)];
-    if (t % stride_ == 0) {
-      gain = gains_[static_cast<size_t>(t / stride_)];
-      continue;
-    }
-    gain = light_over(room_.frames->cells(), snapshots_->slot(t), background_cells_, 1 - published_,
-                      &scratch);
+    const auto before = static_cast<size_t>(t / stride_);
+    gain = gains_[before];
+    if (t % stride_ == 0) continue;
+    gain =
+        light_between(room_.frames->cells(), snapshots_->slot(t), background_cells_, 1 - published_,
+                      gains_[before], gains_[std::min(before + 1, gains_.size() - 1)]);
     const uint8_t* const x[3] = {snapshots_->plane(t, 0), snapshots_->plane(t, 1),
                                  snapshots_->plane(t, 2)};
     if (is_lit(gain)) gain = refine_gain(reference_, x, gain, step_);

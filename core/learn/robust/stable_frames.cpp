@@ -165,19 +165,23 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
 }
 
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
-// too little of it is seen in any frame: the camera moved, or the scene is another.
+// too little of it is seen in any new frame.
 bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recollection& earlier,
                       std::vector<float>* density) {
   std::vector<float> alike(cells);
   float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
   std::fill_n(of_earlier, cells, 0.0f);
-  for (int t = 0; t < count; ++t) {
-    patches->alike(t, count, alike.data());
-    for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += alike[cell];
-  }
+  const auto add = [&](int first, int end) {
+    for (int t = first; t < end; ++t) {
+      patches->alike(t, count, alike.data());
+      for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += alike[cell];
+    }
+  };
+  add(earlier.older_frames, count);
   const auto seen = std::count_if(of_earlier, of_earlier + cells,
                                   [](float frames_alike) { return frames_alike > 0; });
   if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
+  add(0, earlier.older_frames);
   for (int t = 0; t < count; ++t) {
     patches->alike(t, count, alike.data());
     float* of_frame = density->data() + static_cast<size_t>(t) * cells;
@@ -212,10 +216,12 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
                                 const Recollection* earlier, Pool* pool) {
   const size_t cells = grid.cells();
   std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
+  StableFrames result;
   {
     PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
     patches.density(count, pool, density.data());
     if (earlier && !add_recollection(cells, &patches, count, *earlier, &density)) {
+      result.another_scene = true;
       earlier = nullptr;
       density.resize(cells * static_cast<size_t>(count));
     }
@@ -235,7 +241,6 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   std::vector<float>().swap(density);
   std::vector<uint16_t> distance(cells * static_cast<size_t>(looks));
   patch_distance(grid, frames, looks, from.data(), pool, distance.data());
-  StableFrames result;
   result.of_cell = FrameLists(cells, looks);
   result.limit.resize(cells);
   const auto all = static_cast<size_t>(count), cols = static_cast<size_t>(grid.cols);

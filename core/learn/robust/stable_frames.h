@@ -51,6 +51,8 @@ class FrameLists {
 struct StableFrames {
   FrameLists of_cell;
   std::vector<float> limit;
+  // Too little of what was known before is seen again: the camera moved, or the scene is another.
+  bool another_scene = false;
 
   // Where `looks` frames are compared.
   static uint64_t bytes(const Grid& grid, uint64_t looks) {
@@ -62,6 +64,7 @@ struct StableFrames {
 // patches are alike up to `limit`.
 struct Recollection {
   std::vector<float> weight, limit;
+  int older_frames = 0;  // of those that are compared with it, the first so many are no news
 };
 
 // frames: `count` pictures in one light, and a further one of the background in earlier windows
