@@ -9,6 +9,7 @@
 
 #include "core/passes/combine.h"
 #include "core/passes/median_network.h"
+#include "core/passes/median_rows.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
 #include "tests/core/constants.h"
@@ -54,6 +55,33 @@ TEST(MedianNetwork, PutsTheMiddleOfAnySamplesInPlace) {
       expect_middle<64>(samples);
       if (testing::Test::HasFatalFailure()) return;
     }
+}
+
+TEST(MedianRows, IsTheMiddleOfEveryNumberOfRows) {
+  std::mt19937 rng(210);
+  std::uniform_real_distribution<float> level(0, 255);
+  on_every_target([&] {
+    for (size_t count = 1; count <= kMedianRows; ++count) {
+      const size_t width = 1 + rng() % 40;
+      std::vector<std::unique_ptr<BeforeTheEdge<float>>> rows;
+      std::vector<const float*> pointers;
+      std::vector<float> divisors;
+      for (size_t i = 0; i < count; ++i) {
+        rows.push_back(std::make_unique<BeforeTheEdge<float>>(width));
+        for (float& sample : *rows.back()) sample = level(rng);
+        pointers.push_back(rows.back()->data());
+        divisors.push_back(i % 3 ? 1 : 0.5f + level(rng) / 255);
+      }
+      BeforeTheEdge<float> median(width);
+      median_rows(pointers.data(), divisors.data(), count, width, median.data());
+      for (size_t x = 0; x < width; ++x) {
+        std::vector<float> sorted;
+        for (size_t i = 0; i < count; ++i) sorted.push_back(pointers[i][x] / divisors[i]);
+        std::sort(sorted.begin(), sorted.end());
+        ASSERT_EQ(median[x], sorted[count / 2]) << count;
+      }
+    }
+  });
 }
 
 // ---- Packed pixels ----

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/passes/median_rows.h"
+
 namespace qdmd {
 namespace {
 
@@ -108,19 +110,18 @@ Gain without_noise(const Gain& gain) {
 }  // namespace
 
 GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
-  constexpr int kMost = 64;
-  const int used = std::min(count, kMost);
+  const int used = std::min(count, kMedianRows);
   GridFrames result(frames.cells(), 1);
-  std::vector<float> levels(static_cast<size_t>(used));
-  for (int c = 0; c < kChannels; ++c)
-    for (size_t cell = 0; cell < frames.cells(); ++cell) {
-      for (int i = 0; i < used; ++i) {
-        const int t = static_cast<int>(int64_t{i} * count / used);
-        levels[static_cast<size_t>(i)] =
-            frames.plane(t, c)[cell] / gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
-      }
-      result.plane(0, c)[cell] = median(&levels);
+  for (int c = 0; c < kChannels; ++c) {
+    const float* planes[kMedianRows];
+    float divisors[kMedianRows];
+    for (int i = 0; i < used; ++i) {
+      const int t = static_cast<int>(int64_t{i} * count / used);
+      planes[i] = frames.plane(t, c);
+      divisors[i] = gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
     }
+    median_rows(planes, divisors, static_cast<size_t>(used), frames.cells(), result.plane(0, c));
+  }
   return result;
 }
 
