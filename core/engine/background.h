@@ -73,6 +73,8 @@ class Background {
   void hold(double t, State state);
   // L is as it is until publish(), but held no longer.
   void learn() { state_ = State::learnt; }
+  // Learner::mend(): `newest` frames, the last of them at time t, against the L in use.
+  void mend(const SnapshotRange& newest, double t) { learner_->mend(newest, t, &model()); }
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 

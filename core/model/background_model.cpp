@@ -163,6 +163,10 @@ void BackgroundModel::freeze_at(double t) {
   weights_.assign(kIdentity.begin(), kIdentity.end());
 }
 
+void BackgroundModel::replace(size_t first, size_t count, const uint8_t* const level[3]) {
+  for (size_t c = 0; c < kChannels; ++c) std::copy_n(level[c], count, pictures_[c] + first);
+}
+
 void BackgroundModel::make_room(size_t pixels, bool limits) {
   weights_.reserve(kIdentity.size());
   pictures_.reserve(kChannels);

@@ -73,6 +73,9 @@ class BackgroundModel {
   // Where it throws, all is as it was.
   void make_room(size_t pixels, bool limits);
 
+  // Of one that is frozen: pixels first .. first + count - 1 are these, in unit light.
+  void replace(size_t first, size_t count, const uint8_t* const level[3]);
+
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);
   // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one

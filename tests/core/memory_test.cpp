@@ -69,8 +69,8 @@ void paint(int t, Alpha alpha, Picture* picture) {
     }
 }
 
-// From configure() to the end: two windows, a bit of a third, its end, and what else can be asked.
-// Returns the bytes that the engine says it takes.
+// From configure() to the end: two windows, a bit of a third, its end, most of another one, and
+// what else can be asked. Returns the bytes that the engine says it takes.
 double run(const Case& c) {
   const allocator::Unseen unseen;
   Picture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
@@ -90,16 +90,20 @@ double run(const Case& c) {
     while (engine.ready()) see([&] { engine.pop(Output::mask, picture.out()); });
     see([&] { engine.write_background(picture.out()); });
   };
-  const int frames = 2 * c.window + c.window / 5 + 2;
-  for (int t = 0; t < frames; ++t) {
-    paint(t, c.alpha, &picture);
-    see([&] { status = engine.push(picture.in()); });
+  const auto stream = [&](int frames) {
+    for (int t = 0; t < frames; ++t) {
+      paint(t, c.alpha, &picture);
+      see([&] { status = engine.push(picture.in()); });
+      EXPECT_TRUE(status.ok()) << status.message;
+      pop();
+    }
+    see([&] { status = engine.drain(); });
     EXPECT_TRUE(status.ok()) << status.message;
     pop();
-  }
-  see([&] { status = engine.drain(); });
-  EXPECT_TRUE(status.ok()) << status.message;
-  pop();
+  };
+  stream(2 * c.window + c.window / 5 + 2);
+  // A window that is not full looks at most of its frames, beside those that are remembered.
+  stream(c.window - 1);
   const auto promised = static_cast<double>(engine.bytes());
   see([&] { engine.close(); });
   return promised;
@@ -136,7 +140,10 @@ void check(const Case& c) {
   if (asked_for("QDMD_SHOW_MEMORY"))
     std::printf("%-64s %11.0f %11.0f %6.3f\n", describe(c).c_str(), promised, peak, ratio);
   // The channels' modes may be complex, which takes four times the pictures of real ones.
-  const double least = c.method == Method::dmd ? 0.4 : 0.98;
+  // Live windows that fill up again are solved every hop, not just before they are full.
+  const double least = c.method == Method::dmd                              ? 0.4
+                       : c.method == Method::robust && c.mode == Mode::live ? 0.95
+                                                                            : 0.98;
   EXPECT_LE(ratio, 1.02) << promised << " promised, " << peak << " taken";
   EXPECT_GE(ratio, least) << promised << " promised, " << peak << " taken";
 }

@@ -84,7 +84,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       StableFrames::bytes(grid_, looks) + WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
-      static_cast<uint64_t>(window_size) * sizeof(Gain);
+      StandingLooks::bytes(grid_) + static_cast<uint64_t>(window_size) * sizeof(Gain);
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
@@ -124,6 +124,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   background_cells_ = GridFrames(grid_, 2);
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = Earlier(grid_);
+  looks_ = StandingLooks(grid_);
   memory_ = FrameMemory(remembered_frames(room.window_size), pixels(), grid_);
   mask_ = WindowMask(snapshots, pixels());
   samples_ = Window(snapshots, samples_at(finest_step_));
@@ -133,6 +134,12 @@ void RobustLearner::begin(const LearnerRoom& room) {
   spread_.resize(pixels());
   // Runs read to their end.
   reach_.resize(room.frames->window().plane_size());
+}
+
+void RobustLearner::forget() {
+  earlier_.forget();
+  memory_.forget();
+  looks_.forget();
 }
 
 void RobustLearner::remember(Learnt* learnt) const {
@@ -151,6 +158,55 @@ void RobustLearner::recall(const Learnt& learnt) {
 void RobustLearner::follow(const std::vector<uint8_t> level[kChannels]) {
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, level[c].data(), background_cells_.plane(published_, c));
+}
+
+void RobustLearner::mend(const SnapshotRange& newest, double t, BackgroundModel* model) {
+  const int slot = newest.slot(newest.size() - 1);
+  const GridFrames& cells = room_.frames->cells();
+  const float* const frame[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
+  const Gain light = model->light();
+  looks_.follow(frame, light);
+  const float* const background[3] = {background_cells_.plane(published_, 0),
+                                      background_cells_.plane(published_, 1),
+                                      background_cells_.plane(published_, 2)};
+  const std::vector<int>& uncovered = looks_.uncovered(background);
+  if (uncovered.empty()) return;
+  model->set_light(kSameLight);
+  model->freeze_at(t);
+  replace(uncovered, newest, light, model);
+  model->set_light(light);
+}
+
+// The median of the newest frames, every second one, in place of the background of these cells.
+void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& newest,
+                            const Gain& light, BackgroundModel* model) {
+  const SnapshotRange frames = newest.every(2);
+  const auto count = static_cast<size_t>(frames.size());
+  const uint8_t* planes[kChannels * kMendingFrames];
+  float inverse[kChannels * kMendingFrames];
+  for (size_t i = 0; i < count; ++i)
+    for (size_t c = 0; c < kChannels; ++c) {
+      planes[kChannels * i + c] = frames.plane(static_cast<int>(i), static_cast<int>(c));
+      inverse[kChannels * i + c] = 1 / light[c];
+    }
+  const auto stride = static_cast<size_t>(grid_.width);
+  for (int cell : cells) {
+    const int row = cell / grid_.cols, col = cell % grid_.cols;
+    const int left = grid_.left(col), right = grid_.left(col + 1);
+    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
+      for (int x = left; x < right; x += kMedianBlock) {
+        const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
+        const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
+        const uint8_t* rows[kChannels * kMendingFrames];
+        for (size_t i = 0; i < kChannels * count; ++i) rows[i] = planes[i] + first;
+        uint8_t level[kChannels][kMedianBlock], spread[kMedianBlock];
+        uint8_t* const out[3] = {level[0], level[1], level[2]};
+        median_block(rows, inverse, count, width, 1, stride, out, spread);
+        model->replace(first, width, out);
+      }
+    for (int c = 0; c < kChannels; ++c)
+      background_cells_.plane(published_, c)[cell] = looks_.level(cell, c);
+  }
 }
 
 void RobustLearner::set_sample_step(int step) {

@@ -11,6 +11,7 @@
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/stable_frames.h"
+#include "core/learn/robust/standing_looks.h"
 #include "core/passes/fill.h"
 
 namespace qdmd {
@@ -56,7 +57,7 @@ class RobustLearner : public Learner {
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;
-  void forget() override { earlier_.forget(), memory_.forget(); }
+  void forget() override;
   void remember(Learnt* learnt) const override;
   void recall(const Learnt& learnt) override;
   bool makes_limits() const override { return true; }
@@ -66,6 +67,8 @@ class RobustLearner : public Learner {
   void build(Slice slice, BackgroundModel* model) override;
   SolveFacts facts() const override { return facts_; }
   void publish() override { published_ = 1 - published_; }
+
+  void mend(const SnapshotRange& newest, double t, BackgroundModel* model) override;
 
   bool follows_light() const override { return true; }
   void follow(const std::vector<uint8_t> level[kChannels]) override;
@@ -88,6 +91,8 @@ class RobustLearner : public Learner {
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames() const;
   void keep_some();
+  void replace(const std::vector<int>& cells, const SnapshotRange& newest, const Gain& light,
+               BackgroundModel* model);
   void end(BackgroundModel* model);
 
   LearnOptions options_;
@@ -100,6 +105,7 @@ class RobustLearner : public Learner {
   LightScratch light_scratch_;  // of light()
   Earlier earlier_;
   FrameMemory memory_;
+  StandingLooks looks_;  // of the frames that were compared with the background in use
   // Of the newest solve: its window, the share of it that no solve before had, of which every
   // stride-th frame is a snapshot of the decomposition, frames that the start compared, and what it
   // found.

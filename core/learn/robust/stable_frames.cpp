@@ -3,20 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/learn/robust/contour.h"
 #include "core/passes/patch_density.h"
 
 namespace qdmd {
 namespace {
 
-// A region that differs from the background by more than this many levels (mean of the channels)
-// may be what the background looks like without an object. Smaller regions than kLeastCells, looks
-// that fewer than kLeastSupport of the frames share (in units of alike frames, at least two) and
-// contours that are not weaker by kMargin do not count.
-constexpr float kChange = 10;
-constexpr int kLeastCells = 6;
+// Looks that fewer than this share of the frames show (in units of alike frames, at least two) do
+// not count.
 constexpr float kLeastSupport = 0.04f;
-constexpr float kMargin = 1.2f;
-constexpr size_t kLeastContour = 8;
 // The share of cells that must show what an earlier window did: people seldom hide more.
 constexpr float kLeastSeen = 0.15f;
 // Frames that propose regions.
@@ -47,76 +42,6 @@ class GridPicture {
   std::vector<float> levels_;
 };
 
-// Regions of connected cells, diagonals included.
-class Regions {
- public:
-  explicit Regions(const Grid& grid) : grid_(grid), region_of_(grid.cells()) {}
-
-  // The regions of cells where `inside` is set, each a list of cells.
-  const std::vector<std::vector<int>>& find(const std::vector<uint8_t>& inside) {
-    regions_.clear();
-    std::fill(region_of_.begin(), region_of_.end(), -1);
-    for (size_t cell = 0; cell < inside.size(); ++cell) {
-      if (!inside[cell] || region_of_[cell] >= 0) continue;
-      const int id = static_cast<int>(regions_.size());
-      auto& region = regions_.emplace_back();
-      region.push_back(static_cast<int>(cell));
-      region_of_[cell] = id;
-      for (size_t next = 0; next < region.size(); ++next) {
-        const int y = region[next] / grid_.cols, x = region[next] % grid_.cols;
-        for (int yy = std::max(0, y - 1); yy <= std::min(grid_.rows - 1, y + 1); ++yy)
-          for (int xx = std::max(0, x - 1); xx <= std::min(grid_.cols - 1, x + 1); ++xx) {
-            const auto neighbour = static_cast<size_t>(yy * grid_.cols + xx);
-            if (!inside[neighbour] || region_of_[neighbour] >= 0) continue;
-            region_of_[neighbour] = id;
-            region.push_back(static_cast<int>(neighbour));
-          }
-      }
-    }
-    return regions_;
-  }
-  bool in(int region, int cell) const { return region_of_[static_cast<size_t>(cell)] == region; }
-
- private:
-  const Grid& grid_;
-  std::vector<int> region_of_;
-  std::vector<std::vector<int>> regions_;
-};
-
-// The strength of a picture's edges along a region's border: differences of the cells on both sides
-// of each border cell, a channel's mean.
-class Contour {
- public:
-  Contour(const Grid& grid, const Regions& regions, int region, const std::vector<int>& cells) {
-    const auto note = [&](int before, int after) {
-      if (regions.in(region, before) != regions.in(region, after))
-        pairs_.emplace_back(before, after);
-    };
-    // Each pair of cells two apart, of which one is inside, is met from its inside one.
-    for (int cell : cells) {
-      const int y = cell / grid.cols, x = cell % grid.cols;
-      if (y + 2 < grid.rows) note(cell, cell + 2 * grid.cols);
-      if (y >= 2) note(cell - 2 * grid.cols, cell);
-      if (x + 2 < grid.cols) note(cell, cell + 2);
-      if (x >= 2) note(cell - 2, cell);
-    }
-  }
-  size_t size() const { return pairs_.size(); }
-  // planes: of a picture.
-  float strength(const float* const planes[3]) const {
-    double sum = 0;
-    for (const auto& [a, b] : pairs_) {
-      float d = 0;
-      for (int c = 0; c < kChannels; ++c) d += std::abs(planes[c][a] - planes[c][b]);
-      sum += std::min(d / 3, kMostDistance);
-    }
-    return static_cast<float>(sum / static_cast<double>(pairs_.size()));
-  }
-
- private:
-  std::vector<std::pair<int, int>> pairs_;
-};
-
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
 // a contour that the true background does not have.
@@ -126,7 +51,7 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
   const size_t cells = grid.cells();
   GridPicture background(frames, *from);
   const float* const b[3] = {background.plane(0), background.plane(1), background.plane(2)};
-  Regions regions(grid);
+  CellRegions regions(grid);
   std::vector<uint8_t> differs(cells);
   const int proposals = std::min(count, kProposals);
   const int looks = static_cast<int>(density.size() / cells);
@@ -137,22 +62,18 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
           i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
       const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
       for (size_t cell = 0; cell < cells; ++cell) {
-        float d = 0;
-        for (int c = 0; c < kChannels; ++c) d += std::abs(f[c][cell] - b[c][cell]);
-        differs[cell] = d > 3 * kChange;
+        differs[cell] = differs_at(f, b, cell);
       }
       const auto& found = regions.find(differs);
       for (size_t region = 0; region < found.size(); ++region) {
         const std::vector<int>& inside = found[region];
-        if (inside.size() < static_cast<size_t>(kLeastCells)) continue;
+        if (inside.size() < kLeastRegion) continue;
         double support = 0;
         for (int cell : inside)
           support += density[static_cast<size_t>(t) * cells + static_cast<size_t>(cell)];
         support /= static_cast<double>(inside.size());
         if (support < std::max(2.0, kLeastSupport * static_cast<double>(count))) continue;
-        const Contour contour(grid, regions, static_cast<int>(region), inside);
-        if (contour.size() < kLeastContour) continue;
-        if (contour.strength(b) <= kMargin * contour.strength(f) + 1) continue;
+        if (!Contour(grid, regions, static_cast<int>(region), inside).is_weaker(f, b)) continue;
         for (int cell : inside) {
           (*from)[static_cast<size_t>(cell)] = t;
           background.take(frames, t, static_cast<size_t>(cell));
