@@ -70,9 +70,12 @@ size_t norm(const uint8_t* const* x, const uint8_t* const* l, size_t count, floa
   const hn::Rebind<int32_t, decltype(d)> d32;
   const hn::Rebind<uint16_t, decltype(d)> d16;
   const hn::Rebind<uint8_t, decltype(d)> d8;
+  const hn::RebindToUnsigned<decltype(d32)> d32u;
   const auto factor = hn::Set(d, steps), most = hn::Set(d, 255.0f);
-  const auto square = [&](size_t c, size_t p) HWY_ATTR {
-    const auto a = hn::LoadU(d8, x[c] + p), b = hn::LoadU(d8, l[c] + p);
+  // Known not to change with what is written.
+  const uint8_t *xr = x[0], *xg = x[1], *xb = x[2], *lr = l[0], *lg = l[1], *lb = l[2];
+  const auto square = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
+    const auto a = hn::LoadU(d8, of_x), b = hn::LoadU(d8, of_l);
     const auto distance =
         hn::PromoteTo(d16, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
     return hn::Mul(distance, distance);
@@ -80,9 +83,11 @@ size_t norm(const uint8_t* const* x, const uint8_t* const* l, size_t count, floa
   size_t p = 0;
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
     // Saturated sums have a norm of 255 like all above.
-    const auto sum = hn::SaturatedAdd(hn::SaturatedAdd(square(0, p), square(1, p)), square(2, p));
+    const auto sum = hn::SaturatedAdd(
+        hn::SaturatedAdd(square(xr + p, lr + p), square(xg + p, lg + p)), square(xb + p, lb + p));
     const auto level = hn::Mul(factor, hn::Sqrt(hn::ConvertTo(d, hn::PromoteTo(d32, sum))));
-    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(d32, hn::Min(level, most))), d8, out + p);
+    const auto whole = hn::ConvertTo(d32, hn::Min(level, most));
+    hn::StoreU(hn::TruncateTo(d8, hn::BitCast(d32u, whole)), d8, out + p);
   }
   return p;
 }
