@@ -107,7 +107,8 @@ double RobustLearner::solve_seconds(int window_size) const {
   // Passes over pixels, and over the grid, which has at most so many cells as small pictures have
   // pixels.
   const double n = static_cast<double>(pixels()), small = std::min(1.0, n / 3000);
-  return options_.iterations * (8e-3 * small + window_size * (5.5e-4 * small + 4.2e-9 * n));
+  const int snapshots = (window_size + stride_of(window_size) - 1) / stride_of(window_size);
+  return options_.iterations * (1e-3 * small + snapshots * (2.5e-4 * small + 2.2e-9 * n));
 }
 
 uint64_t RobustLearner::solver_bytes(int window_size) const {

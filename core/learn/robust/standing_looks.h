@@ -12,7 +12,7 @@ namespace qdmd {
 // A cell's look is what it showed last for kSteady frames in a row.
 class StandingLooks {
  public:
-  static constexpr int kSteady = 8;
+  static constexpr int kSteady = 10;
 
   StandingLooks() = default;
   // Takes all memory.
