@@ -49,7 +49,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
                   &workers_->pool(), &clock_},
       options.colours, options.steps);
-  background_->set_wishes({options.foreground_threshold, masks_expected_});
+  pass_wishes();
   background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
@@ -126,12 +126,22 @@ uint64_t Engine::bytes() const {
 
 void Engine::set_foreground_threshold(double threshold) {
   options_.foreground_threshold = threshold;
-  if (background_) background_->set_wishes({threshold, masks_expected_});
+  pass_wishes();
+}
+
+void Engine::set_ignored(const IgnoredAreas& areas) {
+  ignored_ = areas;
+  pass_wishes();
 }
 
 void Engine::set_masks_expected(bool expected) {
   masks_expected_ = expected;
-  if (background_) background_->set_wishes({options_.foreground_threshold, expected});
+  pass_wishes();
+}
+
+void Engine::pass_wishes() {
+  if (background_)
+    background_->set_wishes({options_.foreground_threshold, masks_expected_, ignored_});
 }
 
 void Engine::set_threads(int threads) {

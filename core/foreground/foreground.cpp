@@ -28,7 +28,8 @@ void mark(const uint8_t* mask, const uint8_t* shaded, size_t count, uint8_t* out
 double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold) {
+                                           double fixed_threshold, const IgnoredAreas& ignored,
+                                           int width) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
@@ -48,7 +49,11 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       const size_t first = run * kMaxRun;
       const size_t count = std::min(kMaxRun, snapshots.pixels() - first);
       model.evaluate(first, count, background.rows);
+      uint8_t counts[kMaxRun];
+      std::fill_n(counts, count, uint8_t{1});
+      ignored.clear_run(first, count, width, counts);
       for (size_t p = 0; p < count; ++p) {
+        if (!counts[p]) continue;
         int squared = 0;
         for (int c = 0; c < kChannels; ++c) {
           const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
@@ -58,8 +63,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
         const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
         ++histogram[bin];
         if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
+        ++total;
       }
-      total += count;
     }
   }
 

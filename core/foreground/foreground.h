@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/base/image_view.h"
+#include "core/foreground/ignored.h"
 #include "core/model/background_model.h"
 
 namespace qdmd {
@@ -26,9 +27,11 @@ double automatic_threshold(double noise);
 // their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
 // `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
-// Leaves the model's time at the last sampled snapshot.
+// Leaves the model's time at the last sampled snapshot. Pixels of snapshots, `width` wide, that are
+// ignored say nothing.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold);
+                                           double fixed_threshold, const IgnoredAreas& ignored = {},
+                                           int width = 1);
 
 // One frame of a window and what its pictures are made of.
 struct OutputTask {
