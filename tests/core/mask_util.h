@@ -56,6 +56,10 @@ inline Floor with_noise(Floor floor, double sigma, std::mt19937& rng) {
 // Decides about frames before one background, which stays.
 class Watcher {
  public:
+  // What pixels must exceed, and, in much noise, each of them by itself.
+  double threshold = 18;
+  std::vector<uint8_t> limits = {};
+
   explicit Watcher(const Floor& background)
       : decision_(background.width, background.height, Colours::rgb) {
     model_.make_room(background.pixels(), false);
@@ -64,15 +68,15 @@ class Watcher {
   }
   std::vector<uint8_t> mask_of(const Floor& frame, const IgnoredAreas* ignored = nullptr,
                                Pool* pool = nullptr) {
-    Comparison all = {
-        {frame.level[0].data(), frame.level[1].data(), frame.level[2].data()}, &model_, kThreshold};
+    Comparison all = {{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
+                      &model_,
+                      threshold,
+                      limits.empty() ? nullptr : limits.data()};
     all.ignored = ignored;
     decision_.decide(all, pool);
     return {decision_.mask(), decision_.mask() + frame.pixels()};
   }
   Decision& decision() { return decision_; }
-
-  static constexpr double kThreshold = 18;
 
  private:
   BackgroundModel model_;
