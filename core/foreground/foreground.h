@@ -11,7 +11,9 @@ enum class Output {
   background,  // L(t)
   foreground,  // |x - L| per channel
   mask,        // white where Decision says foreground, else black
-  cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
+  // The frame where the mask is white, elsewhere black (transparent with alpha); where the mask is
+  // soft, what is in between.
+  cutout
 };
 
 struct ForegroundStatistics {
@@ -38,12 +40,15 @@ struct OutputTask {
   const uint8_t* x[3];           // the frame's planes
   const BackgroundModel* model;  // at the frame's time
   Output output;
-  // Of mask and cutout: 255 where foreground, else 0; and 255 where the mask's picture is to be
-  // 127, or null.
+  // Of mask and cutout: 255 where foreground, else 0, or in between if it is soft; and 255 where
+  // the mask's picture is to be 127 at least, or null.
   const uint8_t* mask;
   const uint8_t* shaded;
   const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
   uint8_t constant_alpha;  // this
+  bool soft = false;       // the mask
+  // Samples of black.
+  uint8_t black[3] = {0, 0, 0};
 };
 
 // Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write

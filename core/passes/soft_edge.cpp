@@ -1,0 +1,212 @@
+#include "core/passes/soft_edge.h"
+
+#include <algorithm>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/soft_edge.cpp"
+#include "core/passes/simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+namespace {
+
+// A row of a tile with its halo.
+constexpr int kWhole = kSoftTile + 4 * kMostSoftness;
+// The windows' lines are needed for half of the halo.
+constexpr int kLines = kSoftTile + 2 * kMostSoftness;
+// Lines are in 1 / kOne of a level of the guide, and of the mask.
+constexpr int kOne = 65536;
+
+// Sums over windows, modulo 2^32: what comes of them fits.
+using Row = uint32_t[kWhole];
+
+}  // namespace
+
+// Plain loops, which the compiler makes vectors of for each instruction set.
+
+void add_rows(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, int count,
+              uint32_t* HWY_RESTRICT out) {
+  for (int i = 0; i < count; ++i) out[i] = a[i] + b[i];
+}
+
+// out[i] = row[i] + .. + row[i + size - 1], by sums of 1, 2, 4 .. samples. Overwrites the row.
+void sum_along(uint32_t* HWY_RESTRICT row, int count, int size, uint32_t* HWY_RESTRICT out) {
+  alignas(64) Row other;
+  uint32_t *now = row, *next = other;
+  std::memset(out, 0, sizeof(uint32_t) * static_cast<size_t>(count));
+  for (int step = 1, done = 0;; step *= 2) {
+    if (size & step) {
+      const uint32_t* HWY_RESTRICT const from = now + done;
+      for (int i = 0; i < count; ++i) out[i] += from[i];
+      done += step;
+    }
+    if (done == size) return;
+    add_rows(now, now + step, count + size - 2 * step, next);
+    std::swap(now, next);
+  }
+}
+
+// Columns of windows: sums over some rows of the guide, the mask, their product, and the square.
+struct Columns {
+  alignas(64) Row guide = {}, white = {}, both = {}, square = {};
+
+  template <int kSign>
+  void add(const uint8_t* HWY_RESTRICT levels, const uint8_t* HWY_RESTRICT mask, int count) {
+    for (int i = 0; i < count; ++i) {
+      const uint32_t level = levels[i] >> 1, is_white = mask[i] & 1;
+      guide[i] += static_cast<uint32_t>(kSign) * level;
+      white[i] += static_cast<uint32_t>(kSign) * is_white;
+      both[i] += static_cast<uint32_t>(kSign) * (level * is_white);
+      square[i] += static_cast<uint32_t>(kSign) * (level * level);
+    }
+  }
+};
+
+// The line of each window of a row: a = cov / (var + smooth^2), b = mean of the mask - a mean of
+// the guide. A float is made of a whole number and used once, so that nothing is rounded
+// differently where a processor multiplies and adds at once.
+void find_lines(const uint32_t* HWY_RESTRICT guide, const uint32_t* HWY_RESTRICT white,
+                const uint32_t* HWY_RESTRICT both, const uint32_t* HWY_RESTRICT square, int count,
+                uint32_t pixels, float flat, uint32_t* HWY_RESTRICT slope,
+                uint32_t* HWY_RESTRICT offset) {
+  const float share = 1 / static_cast<float>(pixels);
+  for (int i = 0; i < count; ++i) {
+    // pixels^2 cov, and half of pixels^2 var.
+    const auto covariance = static_cast<int32_t>(pixels * both[i] - guide[i] * white[i]);
+    const auto variance = static_cast<int32_t>((pixels * square[i] - guide[i] * guide[i]) >> 1);
+    const float a =
+        static_cast<float>(covariance) * (kOne / 2) / (static_cast<float>(variance) + flat);
+    const auto whole = static_cast<uint32_t>(static_cast<int32_t>(a));
+    slope[i] = whole;
+    const auto b = static_cast<int32_t>(kOne * white[i] - whole * guide[i]);
+    offset[i] = static_cast<uint32_t>(static_cast<int32_t>(static_cast<float>(b) * share));
+  }
+}
+
+void apply_lines(const uint32_t* HWY_RESTRICT slope, const uint32_t* HWY_RESTRICT offset,
+                 const uint8_t* HWY_RESTRICT levels, int count, uint32_t pixels,
+                 uint8_t* HWY_RESTRICT out) {
+  const float share = 255.0f / static_cast<float>(kOne * pixels);
+  const uint32_t half = kOne * pixels / 510;
+  for (int i = 0; i < count; ++i) {
+    const uint32_t level = levels[i] >> 1;
+    const auto sum = static_cast<int32_t>(slope[i] * level + offset[i] + half);
+    const auto alpha = static_cast<int32_t>(static_cast<float>(sum) * share);
+    out[i] = static_cast<uint8_t>(std::clamp(alpha, 0, 255));
+  }
+}
+
+void soften(const uint8_t* guide, const uint8_t* white, size_t stride, int width, int height,
+            int softness, float smooth, uint8_t* out, size_t out_stride) {
+  const int along = 2 * softness + 1, columns = width + 4 * softness, lines = width + 2 * softness;
+  const auto pixels = static_cast<uint32_t>(along * along);
+  // Halves of levels, and half of the square.
+  const float flat = smooth * smooth / 8 * static_cast<float>(pixels) * static_cast<float>(pixels);
+  const auto row = [stride](const uint8_t* samples, int y) {
+    return samples + static_cast<size_t>(y) * stride;
+  };
+  // Of the last `along` rows of windows; one row is overwritten by the newest.
+  alignas(64) uint32_t slopes[2 * kMostSoftness + 1][kLines];
+  alignas(64) uint32_t offsets[2 * kMostSoftness + 1][kLines];
+  alignas(64) Row slope_sums = {}, offset_sums = {};
+  Columns sums;
+  for (int y = 0; y < along - 1; ++y) sums.add<1>(row(guide, y), row(white, y), columns);
+  for (int y = 0; y < height + 2 * softness; ++y) {
+    // Windows whose first row is y.
+    sums.add<1>(row(guide, y + along - 1), row(white, y + along - 1), columns);
+    alignas(64) Row column, window[4];
+    const uint32_t* const all[4] = {sums.guide, sums.white, sums.both, sums.square};
+    for (int k = 0; k < 4; ++k) {
+      std::copy_n(all[k], columns, column);
+      sum_along(column, lines, along, window[k]);
+    }
+    uint32_t* const slope = slopes[y % along];
+    uint32_t* const offset = offsets[y % along];
+    if (y >= along)
+      for (int i = 0; i < lines; ++i) slope_sums[i] -= slope[i], offset_sums[i] -= offset[i];
+    find_lines(window[0], window[1], window[2], window[3], lines, pixels, flat, slope, offset);
+    for (int i = 0; i < lines; ++i) slope_sums[i] += slope[i], offset_sums[i] += offset[i];
+    sums.add<-1>(row(guide, y), row(white, y), columns);
+    const int done = y - 2 * softness;
+    if (done < 0) continue;
+    alignas(64) Row slopes_along, offsets_along;
+    std::copy_n(slope_sums, lines, column);
+    sum_along(column, width, along, slopes_along);
+    std::copy_n(offset_sums, lines, column);
+    sum_along(column, width, along, offsets_along);
+    apply_lines(slopes_along, offsets_along, row(guide, done + 2 * softness) + 2 * softness, width,
+                pixels, out + static_cast<size_t>(done) * out_stride);
+  }
+}
+
+void settle_row(const uint8_t* HWY_RESTRICT soft, const uint8_t* HWY_RESTRICT guide, int most,
+                size_t count, uint8_t* HWY_RESTRICT known, uint8_t* HWY_RESTRICT alpha) {
+  // In 1/256.
+  constexpr int kKept = 240;
+  const int slope = 2 * 256 * kKept / std::max(most, 1);
+  for (size_t i = 0; i < count; ++i) {
+    const int away = known[i] - guide[i], moved = away < 0 ? -away : away;
+    const int kept = std::clamp(2 * 256 * kKept - slope * moved, 0, 256 * kKept) >> 8;
+    // Rounded towards 0: never so near that it stays away.
+    known[i] = static_cast<uint8_t>(guide[i] + away * kept / 256);
+    const int left = alpha[i] - soft[i], sign = left < 0 ? -1 : 1;
+    // What is rounded to the nearest stays where noise moves the edge a little.
+    const int rounding = soft[i] == 0 || soft[i] == 255 ? 0 : 128 * sign;
+    alpha[i] = static_cast<uint8_t>(soft[i] + (left * kept + rounding) / 256);
+  }
+}
+
+bool both_colours(const uint8_t* HWY_RESTRICT mask, size_t stride, size_t width, size_t height) {
+  for (size_t y = 0; y < height; ++y) {
+    const uint8_t* HWY_RESTRICT const row = mask + y * stride;
+    uint8_t others = 0;
+    for (size_t x = 0; x < width; ++x) others |= static_cast<uint8_t>(row[x] ^ mask[0]);
+    if (others) return true;
+  }
+  return false;
+}
+
+void fade_row(const uint8_t* HWY_RESTRICT x, const uint8_t* HWY_RESTRICT alpha, uint8_t black,
+              size_t count, uint8_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; ++i) {
+    const auto sum = static_cast<uint16_t>(x[i] * alpha[i] + black * (255 - alpha[i]) + 127);
+    // sum / 255
+    out[i] = static_cast<uint8_t>(static_cast<uint16_t>(sum + 1 + (sum >> 8)) >> 8);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+
+HWY_EXPORT(soften);
+HWY_EXPORT(settle_row);
+HWY_EXPORT(both_colours);
+HWY_EXPORT(fade_row);
+
+void soften_tile(const uint8_t* guide, const uint8_t* white, size_t stride, int width, int height,
+                 int softness, float smooth, uint8_t* out, size_t out_stride) {
+  HWY_DYNAMIC_DISPATCH(soften)
+  (guide, white, stride, width, height, softness, std::max(smooth, kLeastSmooth), out, out_stride);
+}
+
+void settle(const uint8_t* soft, const uint8_t* guide, int most, size_t count, uint8_t* known,
+            uint8_t* alpha) {
+  HWY_DYNAMIC_DISPATCH(settle_row)(soft, guide, most, count, known, alpha);
+}
+
+bool is_mixed(const uint8_t* mask, size_t stride, size_t width, size_t height) {
+  return HWY_DYNAMIC_DISPATCH(both_colours)(mask, stride, width, height);
+}
+
+void fade(const uint8_t* x, const uint8_t* alpha, uint8_t black, size_t count, uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(fade_row)(x, alpha, black, count, out);
+}
+
+}  // namespace qdmd
+#endif
