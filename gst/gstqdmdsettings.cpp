@@ -2,6 +2,7 @@
 
 #include <iterator>
 
+#include "core/passes/soft_edge.h"
 #include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 
@@ -183,6 +184,14 @@ const Property kProperties[] = {
                                 kControllable);
      },
      QDMD_ENUM(s.shadows)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("mask-softness", "Softness of masks",
+                                "Pixels to either side of a mask's edge over which output=mask and "
+                                "cutout fade, along the edges of the picture and steadily from "
+                                "frame to frame (0: hard). Regions go by the hard mask",
+                                0, guint(kMostSoftness), guint(d.mask_softness), kControllable);
+     },
+     QDMD_UINT(s.mask_softness)},
     {[](const Settings&) {
        return areas_spec("ignore", "Ignore",
                          "Rectangles `<<x,y,width,height>,...>` in pixels, 64 at most, in which "
