@@ -287,8 +287,6 @@ TEST(SoftMask, FollowsThePicturesEdgeAndIsSteady) {
           }
         soft_before = alpha, hard_before = softened.hard;
       }
-      std::printf("noise %.0f softness %d: squared error %.2f of the hard mask's, change %.2f\n",
-                  sigma, softness, soft_error / hard_error, soft_change / hard_change);
       EXPECT_LT(soft_error, 0.5 * hard_error);
       EXPECT_LT(soft_change, 0.5 * hard_change);
     }
@@ -319,9 +317,6 @@ TEST(SoftMask, KeepsUpWithWhatMoves) {
               behind = std::max(behind, alpha[p] / 255.0);
           }
       }
-      std::printf(
-          "contrast %d, %.1f pixels a frame: squared error %.2f of the hard mask's, %.2f left\n",
-          contrast, speed, soft_error / hard_error, behind);
       EXPECT_LT(soft_error, 0.6 * hard_error);
       EXPECT_LT(behind, 0.35);
     }
