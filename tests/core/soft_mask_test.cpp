@@ -232,31 +232,43 @@ struct Disc {
 };
 
 // No tiles, no history: the whole picture at once, as the definition has it.
+void expect_no_seams(const Floor& floor, const Floor& frame, int softness) {
+  SCOPED_TRACE(testing::Message() << floor.width << "x" << floor.height << " " << softness);
+  Pool pool(3);
+  Softened one(floor), three(floor);
+  const auto alpha = one(frame, softness);
+  EXPECT_EQ(three(frame, softness, &pool), alpha);
+  const int halo = soft_halo(softness);
+  Plane guide(floor.width + 2 * halo, floor.height + 2 * halo), white = guide;
+  for (int y = 0; y < guide.height; ++y)
+    for (int x = 0; x < guide.width; ++x) {
+      const size_t p = frame.index(std::clamp(x - halo, 0, floor.width - 1),
+                                   std::clamp(y - halo, 0, floor.height - 1));
+      double squared = 0;
+      for (int c = 0; c < 3; ++c) squared += std::pow(frame.level[c][p] - floor.level[c][p], 2);
+      guide.at(x, y) = std::min(255.0, std::floor(std::sqrt(squared)));
+      white.at(x, y) = one.hard[p] / 255;
+    }
+  const auto expected = guided(guide, white, softness, one.watcher.threshold / 4);
+  for (size_t p = 0; p < alpha.size(); ++p) ASSERT_NEAR(alpha[p], expected[p], 1.01) << p;
+}
+
 TEST(SoftMask, HasNoSeams) {
   std::mt19937 rng(354);
-  Pool pool(3);
   for (auto [width, height] : {std::pair{1, 1}, {1, 70}, {130, 2}, {65, 64}, {150, 131}})
     for (int softness : {1, 5}) {
-      SCOPED_TRACE(testing::Message() << width << "x" << height << " " << softness);
       const Floor floor = grainy_floor(width, height, rng);
       const Disc disc = {width / 2.0, height / 3.0, std::min(width, height) / 2.5};
-      const Floor frame = with_noise(disc.on(floor), 3, rng);
-      Softened one(floor), three(floor);
-      const auto alpha = one(frame, softness);
-      EXPECT_EQ(three(frame, softness, &pool), alpha);
-      const int halo = soft_halo(softness);
-      Plane guide(width + 2 * halo, height + 2 * halo), white = guide;
-      for (int y = 0; y < guide.height; ++y)
-        for (int x = 0; x < guide.width; ++x) {
-          const size_t p =
-              frame.index(std::clamp(x - halo, 0, width - 1), std::clamp(y - halo, 0, height - 1));
-          double squared = 0;
-          for (int c = 0; c < 3; ++c) squared += std::pow(frame.level[c][p] - floor.level[c][p], 2);
-          guide.at(x, y) = std::min(255.0, std::floor(std::sqrt(squared)));
-          white.at(x, y) = one.hard[p] / 255;
-        }
-      const auto expected = guided(guide, white, softness, one.watcher.threshold / 4);
-      for (size_t p = 0; p < alpha.size(); ++p) ASSERT_NEAR(alpha[p], expected[p], 1.01) << p;
+      expect_no_seams(floor, with_noise(disc.on(floor), 3, rng), softness);
+    }
+  // Edges next to where tiles meet. They are weak: what is far counts.
+  const Floor floor = grainy_floor(131, 129, rng);
+  for (int at = 55; at < 75; at += 3)
+    for (const Rectangle& area :
+         {Rectangle{at, 0, 200, 200}, {0, at, 200, 200}, {0, 0, at, 200}, {0, 0, 200, at}}) {
+      Floor frame = floor;
+      frame.paint(area, {150, 125, 130});
+      expect_no_seams(floor, with_noise(frame, 3, rng), 5);
     }
 }
 
@@ -425,6 +437,23 @@ TEST(SoftMask, LeavesMarkedShadowsGrey) {
     ASSERT_EQ(marked[p], hard[p] == 127 ? std::max<int>(soft[p], 127) : soft[p]) << p;
   }
   EXPECT_GT(grey, 4000u);
+}
+
+TEST(SoftMask, IsNeverDarkerThanAMark) {
+  BackgroundModel none;
+  std::vector<uint8_t> mask(256), shaded(256, 255);
+  std::iota(mask.begin(), mask.end(), uint8_t{0});
+  OutputTask task = {{mask.data(), mask.data(), mask.data()},
+                     &none,
+                     Output::mask,
+                     mask.data(),
+                     shaded.data(),
+                     nullptr,
+                     255};
+  task.soft = true;
+  Picture picture(256, 1, 3);
+  write_output(task, picture.out(), 0, 1);
+  for (size_t p = 0; p < 256; ++p) ASSERT_EQ(picture.at(1, p), std::max<size_t>(p, 127));
 }
 
 }  // namespace
