@@ -14,87 +14,111 @@ namespace {
 
 // A row of a tile with its halo.
 constexpr int kWhole = kSoftTile + 4 * kMostSoftness;
-// The windows' lines are needed for half of the halo.
+// Windows of a row whose lines are needed: those of half of the halo, too.
 constexpr int kLines = kSoftTile + 2 * kMostSoftness;
 // Lines are in 1 / kOne of a level of the guide, and of the mask.
 constexpr int kOne = 65536;
 
-// Sums over windows, modulo 2^32: what comes of them fits.
-using Row = uint32_t[kWhole];
+// Rows go in blocks, without a loop for what is left over; what is behind their end is of no use.
+constexpr int kBlock = 16;
+constexpr int in_blocks(int count) { return (count + kBlock - 1) / kBlock * kBlock; }
+
+// Sums over windows, modulo 2^32: what comes of them fits. With what sum_along() reads behind them.
+struct Row {
+  alignas(64) uint32_t at[in_blocks(kWhole) + 3 * kBlock] = {};
+};
 
 }  // namespace
 
 // Plain loops, which the compiler makes vectors of for each instruction set.
 
-void add_rows(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b, int count,
-              uint32_t* HWY_RESTRICT out) {
-  for (int i = 0; i < count; ++i) out[i] = a[i] + b[i];
-}
-
-// out[i] = row[i] + .. + row[i + size - 1], by sums of 1, 2, 4 .. samples. Overwrites the row.
-void sum_along(uint32_t* HWY_RESTRICT row, int count, int size, uint32_t* HWY_RESTRICT out) {
-  alignas(64) Row other;
-  uint32_t *now = row, *next = other;
-  std::memset(out, 0, sizeof(uint32_t) * static_cast<size_t>(count));
+// out[i] = row[i] + .. + row[i + size - 1], by sums of 1, 2, 4 .. samples. rooms: two
+// for these.
+void sum_along(const Row& row, int count, int size, Row* rooms, Row* out) {
+  const uint32_t* now = row.at;
   for (int step = 1, done = 0;; step *= 2) {
     if (size & step) {
       const uint32_t* HWY_RESTRICT const from = now + done;
-      for (int i = 0; i < count; ++i) out[i] += from[i];
+      uint32_t* HWY_RESTRICT const to = out->at;
+      if (done == 0)
+        for (int i = 0; i < count; i += kBlock)
+          for (int k = i; k < i + kBlock; ++k) to[k] = from[k];
+      else
+        for (int i = 0; i < count; i += kBlock)
+          for (int k = i; k < i + kBlock; ++k) to[k] += from[k];
       done += step;
     }
     if (done == size) return;
-    add_rows(now, now + step, count + size - 2 * step, next);
-    std::swap(now, next);
+    const uint32_t* HWY_RESTRICT const from = now;
+    uint32_t* HWY_RESTRICT const to = rooms[(step & 0x55555555) != 0].at;
+    for (int i = 0; i < count + size; i += kBlock)
+      for (int k = i; k < i + kBlock; ++k) to[k] = from[k] + from[k + step];
+    now = to;
   }
 }
 
 // Columns of windows: sums over some rows of the guide, the mask, their product, and the square.
 struct Columns {
-  alignas(64) Row guide = {}, white = {}, both = {}, square = {};
+  Row guide, white, both, square;
 
+  // Samples are readable in whole blocks.
   template <int kSign>
   void add(const uint8_t* HWY_RESTRICT levels, const uint8_t* HWY_RESTRICT mask, int count) {
-    for (int i = 0; i < count; ++i) {
-      const uint32_t level = levels[i] >> 1, is_white = mask[i] & 1;
-      guide[i] += static_cast<uint32_t>(kSign) * level;
-      white[i] += static_cast<uint32_t>(kSign) * is_white;
-      both[i] += static_cast<uint32_t>(kSign) * (level * is_white);
-      square[i] += static_cast<uint32_t>(kSign) * (level * level);
-    }
+    for (int i = 0; i < count; i += kBlock)
+      for (int k = i; k < i + kBlock; ++k) {
+        const uint32_t level = levels[k] >> 1, is_white = mask[k] & 1;
+        guide.at[k] += static_cast<uint32_t>(kSign) * level;
+        white.at[k] += static_cast<uint32_t>(kSign) * is_white;
+        both.at[k] += static_cast<uint32_t>(kSign) * (level * is_white);
+        square.at[k] += static_cast<uint32_t>(kSign) * (level * level);
+      }
   }
 };
 
-// The line of each window of a row: a = cov / (var + smooth^2), b = mean of the mask - a mean of
-// the guide. A float is made of a whole number and used once, so that nothing is rounded
-// differently where a processor multiplies and adds at once.
-void find_lines(const uint32_t* HWY_RESTRICT guide, const uint32_t* HWY_RESTRICT white,
-                const uint32_t* HWY_RESTRICT both, const uint32_t* HWY_RESTRICT square, int count,
-                uint32_t pixels, float flat, uint32_t* HWY_RESTRICT slope,
-                uint32_t* HWY_RESTRICT offset) {
+// Lines of a row of windows, slope and offset.
+struct Lines {
+  alignas(64) uint32_t slope[in_blocks(kLines)], offset[in_blocks(kLines)];
+};
+
+// a = cov / (var + smooth^2), b = mean of the mask - a mean of the guide. A float is made of a
+// whole number and used once, so that nothing is rounded differently where a processor multiplies
+// and adds at once.
+void find_lines(const Row& guide, const Row& white, const Row& both, const Row& square, int count,
+                uint32_t pixels, float flat, Lines* HWY_RESTRICT lines) {
   const float share = 1 / static_cast<float>(pixels);
-  for (int i = 0; i < count; ++i) {
-    // pixels^2 cov, and half of pixels^2 var.
-    const auto covariance = static_cast<int32_t>(pixels * both[i] - guide[i] * white[i]);
-    const auto variance = static_cast<int32_t>((pixels * square[i] - guide[i] * guide[i]) >> 1);
-    const float a =
-        static_cast<float>(covariance) * (kOne / 2) / (static_cast<float>(variance) + flat);
-    const auto whole = static_cast<uint32_t>(static_cast<int32_t>(a));
-    slope[i] = whole;
-    const auto b = static_cast<int32_t>(kOne * white[i] - whole * guide[i]);
-    offset[i] = static_cast<uint32_t>(static_cast<int32_t>(static_cast<float>(b) * share));
-  }
+  for (int i = 0; i < count; i += kBlock)
+    for (int k = i; k < i + kBlock; ++k) {
+      const uint32_t levels = guide.at[k], whites = white.at[k];
+      // pixels^2 cov, and half of pixels^2 var.
+      const auto covariance = static_cast<int32_t>(pixels * both.at[k] - levels * whites);
+      const auto variance = static_cast<int32_t>((pixels * square.at[k] - levels * levels) >> 1);
+      const float a =
+          static_cast<float>(covariance) * (kOne / 2) / (static_cast<float>(variance) + flat);
+      const auto whole = static_cast<uint32_t>(static_cast<int32_t>(a));
+      lines->slope[k] = whole;
+      const auto b = static_cast<int32_t>(kOne * whites - whole * levels);
+      lines->offset[k] = static_cast<uint32_t>(static_cast<int32_t>(static_cast<float>(b) * share));
+    }
 }
 
-void apply_lines(const uint32_t* HWY_RESTRICT slope, const uint32_t* HWY_RESTRICT offset,
-                 const uint8_t* HWY_RESTRICT levels, int count, uint32_t pixels,
-                 uint8_t* HWY_RESTRICT out) {
+template <int kSign>
+void add_lines(const Lines& lines, int count, Row* HWY_RESTRICT slope, Row* HWY_RESTRICT offset) {
+  for (int i = 0; i < count; i += kBlock)
+    for (int k = i; k < i + kBlock; ++k) {
+      slope->at[k] += static_cast<uint32_t>(kSign) * lines.slope[k];
+      offset->at[k] += static_cast<uint32_t>(kSign) * lines.offset[k];
+    }
+}
+
+void apply_lines(const Row& slope, const Row& offset, const uint8_t* HWY_RESTRICT levels, int count,
+                 uint32_t pixels, uint8_t* HWY_RESTRICT out) {
   const float share = 255.0f / static_cast<float>(kOne * pixels);
   const uint32_t half = kOne * pixels / 510;
-  for (int i = 0; i < count; ++i) {
-    const uint32_t level = levels[i] >> 1;
-    const auto sum = static_cast<int32_t>(slope[i] * level + offset[i] + half);
+  for (int k = 0; k < count; ++k) {
+    const uint32_t level = levels[k] >> 1;
+    const auto sum = static_cast<int32_t>(slope.at[k] * level + offset.at[k] + half);
     const auto alpha = static_cast<int32_t>(static_cast<float>(sum) * share);
-    out[i] = static_cast<uint8_t>(std::clamp(alpha, 0, 255));
+    out[k] = static_cast<uint8_t>(std::clamp(alpha, 0, 255));
   }
 }
 
@@ -107,37 +131,36 @@ void soften(const uint8_t* guide, const uint8_t* white, size_t stride, int width
   const auto row = [stride](const uint8_t* samples, int y) {
     return samples + static_cast<size_t>(y) * stride;
   };
-  // Of the last `along` rows of windows; one row is overwritten by the newest.
-  alignas(64) uint32_t slopes[2 * kMostSoftness + 1][kLines];
-  alignas(64) uint32_t offsets[2 * kMostSoftness + 1][kLines];
-  alignas(64) Row slope_sums = {}, offset_sums = {};
+  // Of the last `along` rows of windows; one of them is overwritten by the newest.
+  Lines all_lines[2 * kMostSoftness + 1];
   Columns sums;
-  for (int y = 0; y < along - 1; ++y) sums.add<1>(row(guide, y), row(white, y), columns);
+  Row window[4], rooms[2], slope_sums, offset_sums;
+  uint8_t levels[in_blocks(kWhole)] = {}, mask[in_blocks(kWhole)] = {};
+  const auto copy_row = [&](int y) {
+    std::memcpy(levels, row(guide, y), static_cast<size_t>(columns));
+    std::memcpy(mask, row(white, y), static_cast<size_t>(columns));
+  };
+  for (int y = 0; y < along - 1; ++y) copy_row(y), sums.add<1>(levels, mask, columns);
   for (int y = 0; y < height + 2 * softness; ++y) {
     // Windows whose first row is y.
-    sums.add<1>(row(guide, y + along - 1), row(white, y + along - 1), columns);
-    alignas(64) Row column, window[4];
-    const uint32_t* const all[4] = {sums.guide, sums.white, sums.both, sums.square};
+    copy_row(y + along - 1);
+    sums.add<1>(levels, mask, columns);
+    const Row* const all[4] = {&sums.guide, &sums.white, &sums.both, &sums.square};
     for (int k = 0; k < 4; ++k) {
-      std::copy_n(all[k], columns, column);
-      sum_along(column, lines, along, window[k]);
+      sum_along(*all[k], lines, along, rooms, &window[k]);
     }
-    uint32_t* const slope = slopes[y % along];
-    uint32_t* const offset = offsets[y % along];
-    if (y >= along)
-      for (int i = 0; i < lines; ++i) slope_sums[i] -= slope[i], offset_sums[i] -= offset[i];
-    find_lines(window[0], window[1], window[2], window[3], lines, pixels, flat, slope, offset);
-    for (int i = 0; i < lines; ++i) slope_sums[i] += slope[i], offset_sums[i] += offset[i];
-    sums.add<-1>(row(guide, y), row(white, y), columns);
+    Lines& newest = all_lines[y % along];
+    if (y >= along) add_lines<-1>(newest, lines, &slope_sums, &offset_sums);
+    find_lines(window[0], window[1], window[2], window[3], lines, pixels, flat, &newest);
+    add_lines<1>(newest, lines, &slope_sums, &offset_sums);
+    copy_row(y);
+    sums.add<-1>(levels, mask, columns);
     const int done = y - 2 * softness;
     if (done < 0) continue;
-    alignas(64) Row slopes_along, offsets_along;
-    std::copy_n(slope_sums, lines, column);
-    sum_along(column, width, along, slopes_along);
-    std::copy_n(offset_sums, lines, column);
-    sum_along(column, width, along, offsets_along);
-    apply_lines(slopes_along, offsets_along, row(guide, done + 2 * softness) + 2 * softness, width,
-                pixels, out + static_cast<size_t>(done) * out_stride);
+    sum_along(slope_sums, width, along, rooms, &window[0]);
+    sum_along(offset_sums, width, along, rooms, &window[1]);
+    apply_lines(window[0], window[1], row(guide, y) + 2 * softness, width, pixels,
+                out + static_cast<size_t>(done) * out_stride);
   }
 }
 
