@@ -43,10 +43,11 @@ SoftMask::SoftMask(int width, int height)
       cols_(tiles_along(width)),
       alpha_(static_cast<size_t>(width) * static_cast<size_t>(height)),
       guide_(alpha_.size()),
+      white_(alpha_.size()),
       had_edge_(static_cast<size_t>(rows_) * static_cast<size_t>(cols_)) {}
 
 uint64_t SoftMask::bytes(int width, int height) {
-  return 2 * static_cast<uint64_t>(width) * static_cast<uint64_t>(height) +
+  return 3 * static_cast<uint64_t>(width) * static_cast<uint64_t>(height) +
          static_cast<uint64_t>(tiles_along(width)) * static_cast<uint64_t>(tiles_along(height));
 }
 
@@ -100,11 +101,15 @@ void SoftMask::make_tile(const Frame& frame, int row, int col) {
   alignas(64) uint8_t soft[kSoftTile * kSoftTile];
   soften_tile(tile.guide, tile.white, kWholeTile, tile.width, tile.height, frame.softness,
               frame.flat, soft, kSoftTile);
+  const size_t first = at(left, top);
+  const bool stands = had_edge && !has_moved(mask + first, white_.data() + first, width, size,
+                                             static_cast<size_t>(tile.height));
   for (int y = 0; y < tile.height; ++y) {
+    std::memcpy(white_.data() + at(left, top + y), mask + at(left, top + y), size);
     const uint8_t* const guide = tile.guide + (y + tile.halo) * kWholeTile + tile.halo;
     uint8_t* const known = guide_.data() + at(left, top + y);
     uint8_t* const alpha = alpha_.data() + at(left, top + y);
-    if (had_edge) {
+    if (stands) {
       settle(soft + y * kSoftTile, guide, frame.still, size, known, alpha);
     } else {
       std::memcpy(alpha, soft + y * kSoftTile, size);

@@ -19,8 +19,8 @@ struct SoftEdge {
 };
 
 // The guide of the filter (soften_tile) is |x - L|, which has no edges of the background. Where it
-// hardly changed from the frame before, the edge hardly does (settle). Tiles in which nothing is
-// near an edge are the mask.
+// hardly changed from the frame before, the edge hardly does (settle), unless the mask moved. Tiles
+// in which nothing is near an edge are the mask.
 class SoftMask {
  public:
   // Takes all memory. For frames of width x height pixels.
@@ -44,8 +44,9 @@ class SoftMask {
 
   int width_, height_, rows_, cols_;  // pixels; tiles
   int softness_ = 0;                  // of the frame before; 0: none
-  // Of the frame before, until a tile is made anew. Guides are known of tiles that had an edge.
-  std::vector<uint8_t> alpha_, guide_, had_edge_;
+  // Of the frame before, until a tile is made anew. Guides and the hard mask
+  // are known of tiles that had an edge.
+  std::vector<uint8_t> alpha_, guide_, white_, had_edge_;
 };
 
 }  // namespace qdmd

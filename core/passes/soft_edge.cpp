@@ -166,8 +166,8 @@ void soften(const uint8_t* guide, const uint8_t* white, size_t stride, int width
 
 void settle_row(const uint8_t* HWY_RESTRICT soft, const uint8_t* HWY_RESTRICT guide, int most,
                 size_t count, uint8_t* HWY_RESTRICT known, uint8_t* HWY_RESTRICT alpha) {
-  // In 1/256.
-  constexpr int kKept = 240;
+  // In 1/256; levels of alpha.
+  constexpr int kKept = 240, kHalf = 128, kLittle = 32, kFar = 96;
   const int slope = 2 * 256 * kKept / std::max(most, 1);
   for (size_t i = 0; i < count; ++i) {
     const int away = known[i] - guide[i], moved = away < 0 ? -away : away;
@@ -175,10 +175,27 @@ void settle_row(const uint8_t* HWY_RESTRICT soft, const uint8_t* HWY_RESTRICT gu
     // Rounded towards 0: never so near that it stays away.
     known[i] = static_cast<uint8_t>(guide[i] + away * kept / 256);
     const int left = alpha[i] - soft[i], sign = left < 0 ? -1 : 1;
-    // What is rounded to the nearest stays where noise moves the edge a little.
-    const int rounding = soft[i] == 0 || soft[i] == 255 ? 0 : 128 * sign;
-    alpha[i] = static_cast<uint8_t>(soft[i] + (left * kept + rounding) / 256);
+    const int steps = (kFar - left * sign) * (kHalf / (kFar - kLittle));
+    const bool whole = soft[i] == 0 || soft[i] == 255;
+    const int stays = kept * (kHalf + (whole ? 0 : std::clamp(steps, 0, kHalf))) >> 8;
+    // Rounded to the nearest: what is near stays where it is.
+    alpha[i] = static_cast<uint8_t>(soft[i] + (left * stays + 128 * sign) / 256);
   }
+}
+
+bool move_mask(const uint8_t* HWY_RESTRICT mask, const uint8_t* HWY_RESTRICT before, size_t stride,
+               size_t width, size_t height) {
+  size_t changes = 0, edges = 0;
+  for (size_t y = 0; y < height; ++y) {
+    const uint8_t *const row = mask + y * stride, *const old = before + y * stride;
+    const uint8_t* const above = y > 0 ? row - stride : row;
+    for (size_t x = 0; x < width; ++x) {
+      changes += (row[x] ^ old[x]) & 1;
+      edges += (row[x] ^ above[x]) & 1;
+    }
+    for (size_t x = 1; x < width; ++x) edges += (row[x] ^ row[x - 1]) & 1;
+  }
+  return changes > 2 * edges;
 }
 
 bool both_colours(const uint8_t* HWY_RESTRICT mask, size_t stride, size_t width, size_t height) {
@@ -209,6 +226,7 @@ namespace qdmd {
 
 HWY_EXPORT(soften);
 HWY_EXPORT(settle_row);
+HWY_EXPORT(move_mask);
 HWY_EXPORT(both_colours);
 HWY_EXPORT(fade_row);
 
@@ -221,6 +239,11 @@ void soften_tile(const uint8_t* guide, const uint8_t* white, size_t stride, int 
 void settle(const uint8_t* soft, const uint8_t* guide, int most, size_t count, uint8_t* known,
             uint8_t* alpha) {
   HWY_DYNAMIC_DISPATCH(settle_row)(soft, guide, most, count, known, alpha);
+}
+
+bool has_moved(const uint8_t* mask, const uint8_t* before, size_t stride, size_t width,
+               size_t height) {
+  return HWY_DYNAMIC_DISPATCH(move_mask)(mask, before, stride, width, height);
 }
 
 bool is_mixed(const uint8_t* mask, size_t stride, size_t width, size_t height) {

@@ -26,11 +26,18 @@ void soften_tile(const uint8_t* guide, const uint8_t* white, size_t stride, int 
                  int softness, float smooth, uint8_t* out, size_t out_stride);
 
 // What is left of the edges of frames before. known: the guide that they go by. Where the guide is
-// within half of `most` levels of it, alpha[p] moves by a sixteenth of the way to soft[p], and by
-// nothing if that is half a level or less (it gets to 0 and 255, though); beyond `most`, it becomes
-// soft[p]; in between, something in between. What is known follows the guide in the same way.
+// within half of `most` levels of it, alpha[p] goes a sixteenth of the way to soft[p]; half of it
+// if that is 0 or 255, or far (96 levels; from 32 on something in between); and not at all if
+// soft[p] is neither and within 8 levels. If the guide is further away than `most`, alpha[p]
+// becomes soft[p]; in between, something in between. What is known follows the guide by a
+// sixteenth.
 void settle(const uint8_t* soft, const uint8_t* guide, int most, size_t count, uint8_t* known,
             uint8_t* alpha);
+
+// Whether a mask differs from the one before in more than twice as many pixels as its outline has:
+// rows of `width` samples, 255 or 0, of pictures with rows `stride` apart.
+bool has_moved(const uint8_t* mask, const uint8_t* before, size_t stride, size_t width,
+               size_t height);
 
 // Whether rows of `width` samples, 255 or 0, have both.
 bool is_mixed(const uint8_t* mask, size_t stride, size_t width, size_t height);

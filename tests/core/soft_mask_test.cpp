@@ -165,15 +165,19 @@ TEST(SoftEdge, SettlesWhereTheGuideDoesNotMove) {
       settle(soft.data(), guide.data(), most, kCount, known.data(), alpha.data());
       for (size_t p = 0; p < kCount; ++p) {
         const int away = before[p] - guide[p], left = alphas[p] - soft[p];
-        const double kept = 15.0 / 16 * std::clamp(2 - 2.0 * std::abs(away) / most, 0.0, 1.0);
+        const double known_stays =
+            15.0 / 16 * std::clamp(2 - 2.0 * std::abs(away) / most, 0.0, 1.0);
+        const bool whole = soft[p] == 0 || soft[p] == 255;
+        const double far = whole ? 1 : std::clamp((std::abs(left) - 32) / 64.0, 0.0, 1.0);
+        const double kept = known_stays * (1 - far / 2);
         // Weights are in 1/256, and what they weigh is rounded.
-        ASSERT_NEAR(known[p], guide[p] + kept * away, 2) << p;
-        ASSERT_NEAR(alpha[p], soft[p] + kept * left, 2) << p;
+        ASSERT_NEAR(known[p], guide[p] + known_stays * away, 2) << p;
+        ASSERT_NEAR(alpha[p], soft[p] + kept * left, 2.5) << p;
         if (kept == 0) {
           ASSERT_EQ(alpha[p], soft[p]);
           ASSERT_EQ(known[p], guide[p]);
         }
-        if (2 * std::abs(away) < most && std::abs(left) <= 8 && soft[p] > 0 && soft[p] < 255) {
+        if (2 * std::abs(away) < most && std::abs(left) <= 8 && !whole) {
           ASSERT_EQ(alpha[p], alphas[p]) << "noise moves nothing";
         }
       }
@@ -184,6 +188,28 @@ TEST(SoftEdge, SettlesWhereTheGuideDoesNotMove) {
       ASSERT_EQ(known[p], guide[p]);
       ASSERT_NEAR(alpha[p], soft[p], soft[p] == 0 || soft[p] == 255 ? 0 : 8);
     }
+  });
+}
+
+TEST(SoftEdge, KnowsAMaskThatMoved) {
+  constexpr size_t kStride = 50, kWidth = 40, kHeight = 30;
+  const auto box = [](size_t left) {
+    std::vector<uint8_t> mask(kStride * kHeight);
+    for (size_t y = 5; y < 25; ++y)
+      std::fill_n(mask.begin() + y * kStride + left, 10, uint8_t{255});
+    return mask;
+  };
+  on_every_target([&] {
+    const auto moved = [&](size_t left) {
+      return has_moved(box(left).data(), box(10).data(), kStride, kWidth, kHeight);
+    };
+    // Its outline has 60 pixels; each column that it moves by changes 40.
+    EXPECT_FALSE(moved(10));
+    EXPECT_FALSE(moved(13));
+    EXPECT_TRUE(moved(14));
+    EXPECT_TRUE(moved(22));
+    EXPECT_TRUE(has_moved(std::vector<uint8_t>(kStride * kHeight).data(), box(10).data(), kStride,
+                          kWidth, kHeight));
   });
 }
 
@@ -332,6 +358,16 @@ TEST(SoftMask, KeepsUpWithWhatMoves) {
       EXPECT_LT(soft_error, 0.6 * hard_error);
       EXPECT_LT(behind, 0.35);
     }
+}
+
+// Nothing is left of what jumped.
+TEST(SoftMask, KnowsNothingOfAMaskThatWasElsewhere) {
+  std::mt19937 rng(361);
+  const Floor floor = grainy_floor(64, 64, rng);
+  const auto disc_at = [&](double x) { return Disc{x, 30, 10, {120, 95, 130}}.on(floor); };
+  Softened jumped(floor), fresh(floor);
+  for (int t = 0; t < 5; ++t) jumped(disc_at(15), 3);
+  EXPECT_EQ(jumped(disc_at(45), 3), fresh(disc_at(45), 3));
 }
 
 TEST(SoftMask, IsBackgroundWhereNothingIsLookedAt) {
