@@ -20,6 +20,7 @@ struct SolveReport : SolveFacts {
 struct MaskWishes {
   double threshold = 0;  // a pixel differs above this quaternion norm; 0: from the noise
   bool expected = true;  // somebody is going to look at them
+  IgnoredAreas ignored = {};
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
@@ -88,7 +89,7 @@ class Background {
   const MaskWishes& wishes() const { return wishes_; }
 
  private:
-  void rehearse(bool fixed);
+  void rehearse(const MaskWishes& wishes);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 

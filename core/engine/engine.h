@@ -5,6 +5,7 @@
 
 #include "core/engine/engine_options.h"
 #include "core/engine/schedule.h"
+#include "core/foreground/soft_mask.h"
 
 namespace qdmd {
 
@@ -79,6 +80,13 @@ class Engine {
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
+  // Pixels to either side of a mask's edge over which Output::mask and cutout fade, 0 (hard) to
+  // kMostSoftness. Takes effect at once; foreground() stays hard.
+  void set_mask_softness(int pixels) { softness_ = pixels; }
+  // Where nothing is foreground, and masks learn nothing. Of the frame that pop() gives next; and
+  // of a window whose last frame push() takes next: of its statistics, and of what batch learns
+  // from its first one. Takes effect at once. The background is learnt there as everywhere.
+  void set_ignored(const IgnoredAreas& areas);
   // Whether somebody is going to ask for masks, cut-outs or foreground(). If not, batch saves the
   // time in which it learns, from its first window, what masks need; who asks all the same has
   // masks that learn as frames are decided. True unless it is set.
@@ -103,6 +111,8 @@ class Engine {
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
   void decide_next(OutputTask* task);
+  void soften(OutputTask* task);
+  void pass_wishes();
   Status alpha_refused() const;
   template <typename Action>
   auto flushed_if_it_throws(Action action);
@@ -112,9 +122,12 @@ class Engine {
   Clock clock_;
   Pace pace_{&clock_};
   bool freeze_ = false, masks_expected_ = true;
+  IgnoredAreas ignored_;
+  int softness_ = 0;
   Shadows shadows_ = Shadows::background;
   FrameStore frames_;
   std::unique_ptr<Background> background_;
+  std::unique_ptr<SoftMask> soft_mask_;
   std::unique_ptr<Schedule> schedule_;
   Queue queue_;
   bool decided_ = false;  // the frame that pop() gives next

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/foreground/decision.h"
+#include "core/foreground/soft_mask.h"
 #include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
@@ -51,7 +52,8 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
     return layout;
   }
   layout.bytes = saturating_sum(
-      saturating_sum(saturating_sum(layout.store_bytes, Decision::bytes(width, height)),
+      saturating_sum(saturating_sum(layout.store_bytes, Decision::bytes(width, height) +
+                                                            SoftMask::bytes(width, height)),
                      options.caller_bytes),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
                     Workers::count(options.threads)));

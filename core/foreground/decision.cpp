@@ -192,6 +192,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     specks_.take_out(mask_.data(), 255, pixels / kLeastForeground, true);
     specks_.take_out(mask_.data(), 0, pixels / kLeastHole, false);
   }
+  // Pixels around it may have overruled some.
+  if (frame.ignored) frame.ignored->clear_rows(0, height_, width_, mask_.data());
   if (steps_.noise && !frame.fixed)
     in_bands(height_, parts, [&](int first, int size) { learn(frame, first, size); });
   ++frames_;
@@ -211,6 +213,7 @@ void Decision::compare(const Comparison& frame, int first_row, int row_count) {
       if (!noisy_) foreground_mask(x, level, count, threshold_, nullptr, differing_row(y) + left);
     }
     for (int c = 0; c < kChannels; ++c) repeat_border(level_row(c, y));
+    if (frame.ignored) frame.ignored->clear(y, 0, width_, differing_row(y));
     repeat_border(differing_row(y));
   }
 }
@@ -234,6 +237,7 @@ void Decision::compare_means(const Comparison& frame, int first_row, int row_cou
       for (int p = 0; p < run.count; ++p)
         row[left + p] = run.own[p] > most && run.nearest[p] > alone ? 255 : 0;
     }
+    if (frame.ignored) frame.ignored->clear(y, 0, width_, row);
     repeat_border(row);
   }
 }
@@ -302,6 +306,7 @@ void Decision::explain_span(const Comparison& frame, int y, int grid_row, int fi
         raise_limit(noise + p, kMeansOfTextures, static_cast<size_t>(size), limit);
         keep_beyond(run.nearest + p, limit, size, foreground + p);
         std::fill_n(all, size, uint8_t{255});
+        if (frame.ignored) frame.ignored->clear(y, left + p, size, all);
         learn_distance(run.nearest + p, all, static_cast<size_t>(size), texture_.share(cell),
                        noise + p);
       } else {
@@ -445,6 +450,7 @@ void Decision::learn(const Comparison& frame, int first_row, int row_count) {
         if (grid.left(col + 1) > left + run.count) break;
         ++col;
       }
+      if (frame.ignored) frame.ignored->clear(y, left, run.count, learns);
       learn_distance(run.own, learns, static_cast<size_t>(run.count), share, noise);
     }
   }

@@ -141,6 +141,7 @@ void RobustLearner::forget() {
   earlier_.forget();
   memory_.forget();
   looks_.forget();
+  stream_from_ = -1;
 }
 
 void RobustLearner::remember(Learnt* learnt) const {
@@ -377,6 +378,7 @@ void RobustLearner::decompose(const SnapshotRange& snapshots) {
   fresh_ = std::min(1.0f,
                     static_cast<float>(seen - frames_seen_) / static_cast<float>(snapshots.size()));
   frames_seen_ = seen;
+  if (stream_from_ < 0) stream_from_ = first_number();
 }
 
 void RobustLearner::build(Slice, BackgroundModel* model) {
@@ -429,7 +431,7 @@ std::vector<Gain> RobustLearner::gains_of_frames() const {
 void RobustLearner::keep_some() {
   for (int i = 0; i < snapshots_->size(); ++i) {
     const int64_t number = first_number() + i;
-    if (number % kRememberedStep != 0 || number <= memory_.newest()) continue;
+    if ((number - stream_from_) % kRememberedStep != 0 || number <= memory_.newest()) continue;
     memory_.keep(number, *snapshots_, i, room_.frames->cells(),
                  int64_t{kRememberedWindows} * room_.window_size);
   }

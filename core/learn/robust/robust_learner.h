@@ -112,6 +112,7 @@ class RobustLearner : public Learner {
   std::optional<SnapshotRange> snapshots_;
   float fresh_ = 1;
   int stride_ = 1;
+  int64_t stream_from_ = -1;  // the first frame since forget(); -1: none was solved
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
   StableFrames stable_;
