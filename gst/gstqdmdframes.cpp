@@ -234,7 +234,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       const Clock::Span span(engine.clock(), Clock::frames);
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
       engine.set_shadows(settings.shadows);
-      engine.set_mask_softness(settings.mask_softness);
+      engine.set_mask_softness(settings.engine.mask_softness);
       engine.set_ignored(ignored_of(settings, shell.get()));
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       state->io.write(&frame, settings.output,

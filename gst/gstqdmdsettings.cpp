@@ -189,9 +189,10 @@ const Property kProperties[] = {
                                 "Pixels to either side of a mask's edge over which output=mask and "
                                 "cutout fade, along the edges of the picture and steadily from "
                                 "frame to frame (0: hard). Regions go by the hard mask",
-                                0, guint(kMostSoftness), guint(d.mask_softness), kControllable);
+                                0, guint(kMostSoftness), guint(d.engine.mask_softness),
+                                kControllable);
      },
-     QDMD_UINT(s.mask_softness)},
+     QDMD_UINT(s.engine.mask_softness)},
     {[](const Settings&) {
        return areas_spec("ignore", "Ignore",
                          "Rectangles `<<x,y,width,height>,...>` in pixels, 64 at most, in which "

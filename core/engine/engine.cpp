@@ -49,7 +49,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
                   &workers_->pool(), &clock_},
       options.colours, options.steps);
-  soft_mask_ = std::make_unique<SoftMask>(width, height);
+  if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
   background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
@@ -79,7 +79,7 @@ void Engine::flush() {
   if (schedule_) {
     schedule_->restart();
     background_->forget();
-    soft_mask_->forget();
+    if (soft_mask_) soft_mask_->forget();
   }
   pace_.restart();
 }
@@ -124,7 +124,9 @@ Status Engine::drain() {
 }
 
 uint64_t Engine::bytes() const {
-  return configured() ? layout_.bytes - layout_.store_bytes + frames_.bytes() : 0;
+  if (!configured()) return 0;
+  const uint64_t soft = soft_mask_ ? SoftMask::bytes(frames_.width(), frames_.height()) : 0;
+  return layout_.bytes - layout_.store_bytes - layout_.soft_bytes + frames_.bytes() + soft;
 }
 
 void Engine::set_foreground_threshold(double threshold) {
@@ -190,7 +192,8 @@ void Engine::decide_next(OutputTask* task) {
 
 // Once a frame.
 void Engine::soften(OutputTask* task) {
-  const SoftEdge edge = {softness_, background_->report().foreground.threshold};
+  if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames_.width(), frames_.height());
+  const SoftEdge edge = {options_.mask_softness, background_->report().foreground.threshold};
   soft_mask_->make(background_->decision(), task->x, edge, ignored_,
                    workers_->side().idle() ? &workers_->pool() : nullptr);
   task->mask = soft_mask_->alpha();
@@ -261,9 +264,9 @@ void Engine::pop(Output output, const MutableImageView& out) {
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
     if (masked) decide_next(&task);
-    if (masked && softness_ > 0)
+    if (masked && options_.mask_softness > 0)
       soften(&task);
-    else
+    else if (soft_mask_)
       soft_mask_->forget();
     const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
     // While the side thread works, its work has the pool.

@@ -74,15 +74,16 @@ class Engine {
   int pending() const { return queue_.pending; }
   uint64_t solves() const { return background_ ? background_->solves() : 0; }
   SolveReport report() const { return background_ ? background_->report() : SolveReport(); }
-  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies, its
-  // own.
+  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies or a
+  // mask is soft, their own.
   uint64_t bytes() const;
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
   // Pixels to either side of a mask's edge over which Output::mask and cutout fade, 0 (hard) to
-  // kMostSoftness. Takes effect at once; foreground() stays hard.
-  void set_mask_softness(int pixels) { softness_ = pixels; }
+  // kMostSoftness. Takes effect at once; foreground() stays hard. Where configure() was told of
+  // none, the first soft mask takes memory that max_memory does not know of.
+  void set_mask_softness(int pixels) { options_.mask_softness = pixels; }
   // Where nothing is foreground, and masks learn nothing. Of the frame that pop() gives next; and
   // of a window whose last frame push() takes next: of its statistics, and of what batch learns
   // from its first one. Takes effect at once. The background is learnt there as everywhere.
@@ -123,7 +124,6 @@ class Engine {
   Pace pace_{&clock_};
   bool freeze_ = false, masks_expected_ = true;
   IgnoredAreas ignored_;
-  int softness_ = 0;
   Shadows shadows_ = Shadows::background;
   FrameStore frames_;
   std::unique_ptr<Background> background_;

@@ -52,8 +52,9 @@ struct Steady {
 
   Steady(const EngineOptions& options, Alpha alpha, std::mt19937& rng)
       : out(kWidth, kHeight, alpha == Alpha::none ? 3 : 4, alpha != Alpha::none) {
-    EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-    engine.set_mask_softness(2);
+    EngineOptions soft = options;
+    soft.mask_softness = 2;
+    EXPECT_TRUE(engine.configure(soft, kWidth, kHeight).ok());
     IgnoredAreas areas;
     areas.add({10, 10, 50, 50});
     engine.set_ignored(areas);

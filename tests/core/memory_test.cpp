@@ -26,6 +26,7 @@ struct Case {
   Alpha alpha = Alpha::none;
   int width = 320, height = 240, window = 100, threads = 1;
   double rate = 0;  // frames per second: known, some come while a window is solved
+  int softness = 0;
 };
 
 EngineOptions options_of(const Case& c) {
@@ -36,6 +37,7 @@ EngineOptions options_of(const Case& c) {
   options.window_size = c.window;
   options.threads = c.threads;
   options.frame_rate = c.rate;
+  options.mask_softness = c.softness;
   return options;
 }
 
@@ -47,7 +49,7 @@ std::string describe(const Case& c) {
   return name + (c.mode == Mode::live ? " live " : " batch ") + std::to_string(c.width) + "x" +
          std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
          std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)] +
-         (c.rate > 0 ? ", solved beside" : "");
+         (c.rate > 0 ? ", solved beside" : "") + (c.softness > 0 ? ", soft" : "");
 }
 
 // A light that goes up and down, something that moves, and noise, which makes the frames linearly
@@ -191,6 +193,41 @@ TEST(Memory, OfTheDefaultSolvedBeside) {
           }
           check(c);
         }
+}
+
+TEST(Memory, OfSoftMasks) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (Mode mode : {Mode::batch, Mode::live}) {
+    Case c;
+    c.mode = mode;
+    c.width = 640, c.height = 480, c.window = 12;
+    c.softness = 3;
+    check(c);
+  }
+}
+
+// Those that are asked for late count from then on.
+TEST(Memory, OfSoftMasksCountsOnceThereAreAny) {
+  Engine engine;
+  Case c;
+  c.window = 2;
+  ASSERT_TRUE(engine.configure(options_of(c), c.width, c.height).ok());
+  const uint64_t before = engine.bytes();
+  engine.set_mask_softness(2);
+  EXPECT_EQ(engine.bytes(), before);
+  Picture picture(c.width, c.height, 3);
+  for (int t = 0; t < 2; ++t) {
+    paint(t, Alpha::none, &picture);
+    ASSERT_TRUE(engine.push(picture.in()).ok());
+  }
+  ASSERT_TRUE(engine.drain().ok());
+  engine.pop(Output::mask, picture.out());
+  const uint64_t after = engine.bytes();
+  EXPECT_EQ(after - before, SoftMask::bytes(c.width, c.height));
+  c.softness = 2;
+  EXPECT_EQ(layout_of(options_of(c), c.width, c.height).bytes, after);
+  c.softness = kMostSoftness + 1;
+  EXPECT_FALSE(check_options(options_of(c), c.width, c.height).ok());
 }
 
 TEST(Memory, OfQdmd) {
