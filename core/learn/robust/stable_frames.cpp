@@ -179,8 +179,9 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
       // A frame is not its own neighbour, but of two it would be wrong to trust the other.
       const auto left_out = count > 2 ? static_cast<size_t>(from[cell]) : all;
       float limit = limit_of({of_cell, all}, left_out, {scratch, all});
-      // No frame need show what an earlier window did.
-      if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
+      // No frame of the window need show what an earlier one did.
+      if (earlier && (from[cell] == count || from[cell] < earlier->older_frames))
+        limit = std::min(limit, earlier->limit[cell]);
       result.limit[cell] = limit;
       result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
     }
