@@ -19,11 +19,13 @@ int chosen_step(int width, int height) {
 // Samples along the short side that the coarsest step leaves: half of those that are chosen.
 constexpr size_t kFewestSamples = 28;
 
-// Every second frame of a window tells as much of its background as all do, where that many are
-// left.
-constexpr int kLeastSnapshots = 50;
-int stride_of(int frames) { return frames >= 2 * kLeastSnapshots ? 2 : 1; }
+// Every second frame of a window like the default's tells nearly as much of its background as all
+// do, in half of the time. Fewer frames than kLeastSnapshots tell less; a window of kLong frames
+// and more is for the best background that there is.
+constexpr int kLeastSnapshots = 50, kLong = 200;
+int stride_of(int frames) { return frames >= 2 * kLeastSnapshots && frames < kLong ? 2 : 1; }
 int most_snapshots(int window_size) {
+  if (window_size >= kLong) return window_size;
   return std::max(std::min(window_size, 2 * kLeastSnapshots - 1), (window_size + 1) / 2);
 }
 
