@@ -26,7 +26,7 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
   // A solve that takes less of a frame's time is done at once.
   constexpr double kAtOnce = 1.0 / 3;
   // Other machines, and other work on this one.
-  constexpr double kMargin = 2;
+  constexpr double kMargin = 4;
   const double frames = learner.solve_seconds(options.window_size) * options.frame_rate;
   if (!(frames > kAtOnce)) return 0;
   return static_cast<int>(
