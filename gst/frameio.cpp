@@ -75,7 +75,7 @@ void FrameIo::put(GstVideoFrame* frame, Output output) const {
       case Output::foreground:
         return c == 0 ? std::min(kBlack + sample, int{kWhite}) : kNeutral;
       case Output::mask:
-        return c > 0 ? kNeutral : sample ? kWhite : kBlack;
+        return c > 0 ? kNeutral : kBlack + ((kWhite - kBlack) * sample + 127) / 255;
       case Output::cutout:
         break;
     }

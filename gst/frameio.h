@@ -20,7 +20,8 @@ class FrameIo {
 
   ImageView read(const MappedVideoFrame& frame);
   // Calls fill(view), which writes what `output` says, and puts it into the frame. In Y, U and V a
-  // residual is shown by its luma, and black and white are those of video: 16 and 235.
+  // residual is shown by its luma, and black and white are those of video: 16 and 235, with a
+  // mask's greys in between.
   template <typename Fill>
   void write(MappedVideoFrame* frame, Output output, Fill fill) {
     if (frame->has_view()) {

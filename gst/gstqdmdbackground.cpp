@@ -35,6 +35,7 @@
 #include <new>
 #include <utility>
 
+#include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdframes.h"
 #include "gst/gstqdmdlearnt.h"
@@ -80,6 +81,19 @@ static void gst_qdmd_background_set_load_location(GObject* object, const GValue*
                         (nullptr));
 }
 
+// Without locks.
+static void warn_of_rectangles(GObject* object, const GValue* value, GParamSpec* spec) {
+  qdmd::IgnoredAreas areas;
+  const guint left_out = qdmd::add_areas_of(value, &areas);
+  if (left_out > 0)
+    GST_ELEMENT_WARNING(
+        object, LIBRARY, SETTINGS,
+        ("%s leaves out %u rectangles: each has four whole numbers, x, y, width and "
+         "height, the last two above 0, and there are at most %u.",
+         spec->name, left_out, guint(qdmd::IgnoredAreas::kMost)),
+        (nullptr));
+}
+
 static void gst_qdmd_background_set_property(GObject* object, guint id, const GValue* value,
                                              GParamSpec* spec) {
   qdmd::State* state = GST_QDMD_BACKGROUND(object)->state;
@@ -97,6 +111,7 @@ static void gst_qdmd_background_set_property(GObject* object, guint id, const GV
   const bool changed = known && g_param_values_cmp(spec, &before, value) != 0;
   g_value_unset(&before);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  if (GST_IS_PARAM_SPEC_ARRAY_LIST(spec)) warn_of_rectangles(object, value, spec);
   if (changed && running && (spec->flags & GST_PARAM_MUTABLE_READY))
     GST_ELEMENT_WARNING(object, LIBRARY, SETTINGS,
                         ("%s takes effect with the next caps, or when the element starts again "

@@ -13,7 +13,7 @@ GType gst_qdmd_background_output_get_type() {
       {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
       {int(Output::mask),
        "White where the frame differs from the background by more than it does by itself, else "
-       "black",
+       "black; grey at its edges with mask-softness",
        "mask"},
       {int(Output::cutout),
        "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
@@ -26,7 +26,7 @@ GType gst_qdmd_background_shadows_get_type() {
   static const GEnumValue values[] = {
       {int(Shadows::background), "Background", "background"},
       {int(Shadows::foreground), "Foreground, where they are strong enough", "foreground"},
-      {int(Shadows::marked), "Background, and grey (127) in output=mask", "marked"},
+      {int(Shadows::marked), "Background, and grey (127) in output=mask, never soft", "marked"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundShadows", values);
   return type;

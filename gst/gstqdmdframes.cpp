@@ -5,6 +5,7 @@
 #include <new>
 #include <utility>
 
+#include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdlearnt.h"
 
@@ -167,6 +168,13 @@ static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
   if (GST_CLOCK_TIME_IS_VALID(time)) gst_object_sync_values(GST_OBJECT(self), time);
 }
 
+// Where nothing is foreground in the frame of this buffer.
+static IgnoredAreas ignored_of(const Settings& settings, GstBuffer* buffer) {
+  IgnoredAreas areas = settings.ignored;
+  add_regions_of(buffer, settings.ignored_type, &areas);
+  return areas;
+}
+
 // Regions of the frame that comes out next.
 static const std::vector<Region>& next_regions(GstQdmdBackground* self, int least_area) {
   State* state = self->state;
@@ -226,6 +234,8 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       const Clock::Span span(engine.clock(), Clock::frames);
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
       engine.set_shadows(settings.shadows);
+      engine.set_mask_softness(settings.engine.mask_softness);
+      engine.set_ignored(ignored_of(settings, shell.get()));
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       state->io.write(&frame, settings.output,
                       [&](const MutableImageView& view) { engine.pop(settings.output, view); });
@@ -418,12 +428,10 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
 
   const GstClockTime came = time_now(self);
   GST_OBJECT_LOCK(self);
-  const bool freeze = state->settings.freeze;
-  const int threads = state->settings.engine.threads;
-  const double budget = state->settings.time_budget;
-  const Output output = state->settings.output;
-  const bool masks = state->settings.regions || output == Output::mask || output == Output::cutout;
+  const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
+  const bool masks =
+      settings.regions || settings.output == Output::mask || settings.output == Output::cutout;
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
       shell.get(), buffer.get(),
@@ -439,10 +447,11 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
     const bool taken = with_engine(self, [&](Engine& engine) {
       const Clock::Span span(engine.clock(), Clock::frames);
       state->shells.push(std::move(shell));
-      engine.set_freeze(freeze);
-      engine.set_threads(threads);
-      engine.set_time_budget(budget / 1000);
+      engine.set_freeze(settings.freeze);
+      engine.set_threads(settings.engine.threads);
+      engine.set_time_budget(settings.time_budget / 1000);
       engine.set_masks_expected(masks);
+      engine.set_ignored(ignored_of(settings, buffer.get()));
       const Status status = engine.push(state->io.read(frame));
       note_solve(self, nullptr);
       return status;

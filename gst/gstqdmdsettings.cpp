@@ -2,6 +2,8 @@
 
 #include <iterator>
 
+#include "core/passes/soft_edge.h"
+#include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 
 namespace qdmd {
@@ -182,6 +184,41 @@ const Property kProperties[] = {
                                 kControllable);
      },
      QDMD_ENUM(s.shadows)},
+    {[](const Settings& d) {
+       return g_param_spec_uint("mask-softness", "Softness of masks",
+                                "Pixels to either side of a mask's edge over which output=mask and "
+                                "cutout fade, along the edges of the picture and steadily from "
+                                "frame to frame (0: hard). Regions go by the hard mask",
+                                0, guint(kMostSoftness), guint(d.engine.mask_softness),
+                                kControllable);
+     },
+     QDMD_UINT(s.engine.mask_softness)},
+    {[](const Settings&) {
+       return areas_spec("ignore", "Ignore",
+                         "Rectangles `<<x,y,width,height>,...>` in pixels, 64 at most, in which "
+                         "nothing is foreground and masks learn nothing. What reaches beyond the "
+                         "picture is cut off; rectangles without a pixel are left out",
+                         kAnyTime);
+     },
+     [](Settings& s, const GValue* v) {
+       s.ignored = {};
+       add_areas_of(v, &s.ignored);
+     },
+     [](const Settings& s, GValue* v) { areas_to(s.ignored, v); }},
+    {[](const Settings&) {
+       return g_param_spec_string(
+           "ignore-roi-type", "Ignore regions of interest",
+           "Type of GstVideoRegionOfInterestMeta on a frame's buffer that is "
+           "ignored like `ignore`, in that frame (empty: none)",
+           nullptr, kAnyTime);
+     },
+     [](Settings& s, const GValue* v) {
+       const gchar* type = g_value_get_string(v);
+       s.ignored_type = type && *type ? g_quark_from_string(type) : 0;
+     },
+     [](const Settings& s, GValue* v) {
+       g_value_set_static_string(v, g_quark_to_string(s.ignored_type));
+     }},
 };
 
 }  // namespace

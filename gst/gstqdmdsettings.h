@@ -6,6 +6,7 @@
 #include "core/engine/engine_options.h"
 #include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
+#include "core/foreground/ignored.h"
 
 namespace qdmd {
 
@@ -15,13 +16,15 @@ struct Settings {
   bool freeze = false, post_messages = false, regions = false;
   int regions_min_area = 0;  // pixels
   double time_budget = 0;    // milliseconds a frame; 0: no limit
+  IgnoredAreas ignored;
+  GQuark ignored_type = 0;  // of regions of interest that are ignored, too; 0: none
   EngineOptions engine;
   guint asked = 0;  // what somebody has set, a bit for each id
 };
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 21;
+inline constexpr guint kFirstFreeProperty = 24;
 static_assert(kFirstFreeProperty <= 32, "Settings::asked has a bit for each");
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.

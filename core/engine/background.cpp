@@ -55,20 +55,23 @@ void Background::build(Slice slice) { learner_->build(slice, &models_[next()]); 
 void Background::finish(const MaskWishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
-  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold);
+  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold,
+                                                  wishes.ignored, room_.frames->width());
   // Nobody decides before there is a first model.
   if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
-    rehearse(wishes.threshold > 0);
+    rehearse(wishes);
 }
 
 // What moves is known before the first frame of a stream is decided.
-void Background::rehearse(bool fixed) {
+void Background::rehearse(const MaskWishes& wishes) {
   constexpr int kEvery = 4;
+  const bool fixed = wishes.threshold > 0;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
-    Comparison frame = {{}, &model, foreground.threshold, fixed ? nullptr : model.limits(), fixed};
+    Comparison frame = {
+        {}, &model, foreground.threshold, fixed ? nullptr : model.limits(), fixed, &wishes.ignored};
     for (int c = 0; c < kChannels; ++c) frame.x[c] = snapshots_->plane(t, c);
     decision_.decide(frame, room_.pool);
   }
@@ -80,7 +83,8 @@ void Background::decide(const uint8_t* const x[3], Pool* pool) {
                     &model(),
                     report_.foreground.threshold,
                     fixed ? nullptr : model().limits(),
-                    fixed},
+                    fixed,
+                    &wishes_.ignored},
                    pool);
 }
 

@@ -20,6 +20,7 @@ struct SolveReport : SolveFacts {
 struct MaskWishes {
   double threshold = 0;  // a pixel differs above this quaternion norm; 0: from the noise
   bool expected = true;  // somebody is going to look at them
+  IgnoredAreas ignored = {};
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
@@ -73,6 +74,8 @@ class Background {
   void hold(double t, State state);
   // L is as it is until publish(), but held no longer.
   void learn() { state_ = State::learnt; }
+  // Learner::mend(): `newest` frames, the last of them at time t, against the L in use.
+  void mend(const SnapshotRange& newest, double t) { learner_->mend(newest, t, &model()); }
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 
@@ -86,7 +89,7 @@ class Background {
   const MaskWishes& wishes() const { return wishes_; }
 
  private:
-  void rehearse(bool fixed);
+  void rehearse(const MaskWishes& wishes);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 

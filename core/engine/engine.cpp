@@ -49,7 +49,8 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
                   &workers_->pool(), &clock_},
       options.colours, options.steps);
-  background_->set_wishes({options.foreground_threshold, masks_expected_});
+  if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
+  pass_wishes();
   background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
@@ -68,6 +69,7 @@ void Engine::close() {
   // Its threads end before what they work on.
   workers_.reset();
   background_.reset();
+  soft_mask_.reset();
   frames_ = FrameStore();
 }
 
@@ -77,6 +79,7 @@ void Engine::flush() {
   if (schedule_) {
     schedule_->restart();
     background_->forget();
+    if (soft_mask_) soft_mask_->forget();
   }
   pace_.restart();
 }
@@ -121,17 +124,29 @@ Status Engine::drain() {
 }
 
 uint64_t Engine::bytes() const {
-  return configured() ? layout_.bytes - layout_.store_bytes + frames_.bytes() : 0;
+  if (!configured()) return 0;
+  const uint64_t soft = soft_mask_ ? SoftMask::bytes(frames_.width(), frames_.height()) : 0;
+  return layout_.bytes - layout_.store_bytes - layout_.soft_bytes + frames_.bytes() + soft;
 }
 
 void Engine::set_foreground_threshold(double threshold) {
   options_.foreground_threshold = threshold;
-  if (background_) background_->set_wishes({threshold, masks_expected_});
+  pass_wishes();
+}
+
+void Engine::set_ignored(const IgnoredAreas& areas) {
+  ignored_ = areas;
+  pass_wishes();
 }
 
 void Engine::set_masks_expected(bool expected) {
   masks_expected_ = expected;
-  if (background_) background_->set_wishes({options_.foreground_threshold, expected});
+  pass_wishes();
+}
+
+void Engine::pass_wishes() {
+  if (background_)
+    background_->set_wishes({options_.foreground_threshold, masks_expected_, ignored_});
 }
 
 void Engine::set_threads(int threads) {
@@ -173,6 +188,17 @@ void Engine::decide_next(OutputTask* task) {
   decided_ = true;
   task->mask = background_->decision().mask();
   task->shaded = background_->decision().shaded();
+}
+
+// Once a frame.
+void Engine::soften(OutputTask* task) {
+  if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames_.width(), frames_.height());
+  const SoftEdge edge = {options_.mask_softness, background_->report().foreground.threshold};
+  soft_mask_->make(background_->decision(), task->x, edge, ignored_,
+                   workers_->side().idle() ? &workers_->pool() : nullptr);
+  task->mask = soft_mask_->alpha();
+  task->soft = true;
+  if (options_.colours == Colours::yuv) task->black[0] = 16, task->black[1] = task->black[2] = 128;
 }
 
 void Engine::foreground(uint8_t* mask, uint8_t* residual) {
@@ -236,7 +262,12 @@ void Engine::pop(Output output, const MutableImageView& out) {
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
     OutputTask task = next_task(output);
-    if (output == Output::mask || output == Output::cutout) decide_next(&task);
+    const bool masked = output == Output::mask || output == Output::cutout;
+    if (masked) decide_next(&task);
+    if (masked && options_.mask_softness > 0)
+      soften(&task);
+    else if (soft_mask_)
+      soft_mask_->forget();
     const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {

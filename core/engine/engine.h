@@ -5,6 +5,7 @@
 
 #include "core/engine/engine_options.h"
 #include "core/engine/schedule.h"
+#include "core/foreground/soft_mask.h"
 
 namespace qdmd {
 
@@ -73,12 +74,20 @@ class Engine {
   int pending() const { return queue_.pending; }
   uint64_t solves() const { return background_ ? background_->solves() : 0; }
   SolveReport report() const { return background_ ? background_->report() : SolveReport(); }
-  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies, its
-  // own.
+  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies or a
+  // mask is soft, their own.
   uint64_t bytes() const;
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
+  // Pixels to either side of a mask's edge over which Output::mask and cutout fade, 0 (hard) to
+  // kMostSoftness. Takes effect at once; foreground() stays hard. Where configure() was told of
+  // none, the first soft mask takes memory that max_memory does not know of.
+  void set_mask_softness(int pixels) { options_.mask_softness = pixels; }
+  // Where nothing is foreground, and masks learn nothing. Of the frame that pop() gives next; and
+  // of a window whose last frame push() takes next: of its statistics, and of what batch learns
+  // from its first one. Takes effect at once. The background is learnt there as everywhere.
+  void set_ignored(const IgnoredAreas& areas);
   // Whether somebody is going to ask for masks, cut-outs or foreground(). If not, batch saves the
   // time in which it learns, from its first window, what masks need; who asks all the same has
   // masks that learn as frames are decided. True unless it is set.
@@ -103,6 +112,8 @@ class Engine {
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
   void decide_next(OutputTask* task);
+  void soften(OutputTask* task);
+  void pass_wishes();
   Status alpha_refused() const;
   template <typename Action>
   auto flushed_if_it_throws(Action action);
@@ -112,9 +123,11 @@ class Engine {
   Clock clock_;
   Pace pace_{&clock_};
   bool freeze_ = false, masks_expected_ = true;
+  IgnoredAreas ignored_;
   Shadows shadows_ = Shadows::background;
   FrameStore frames_;
   std::unique_ptr<Background> background_;
+  std::unique_ptr<SoftMask> soft_mask_;
   std::unique_ptr<Schedule> schedule_;
   Queue queue_;
   bool decided_ = false;  // the frame that pop() gives next

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/foreground/decision.h"
+#include "core/foreground/soft_mask.h"
 #include "core/learn/learner.h"
 #include "core/parallel/workers.h"
 
@@ -25,7 +26,7 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
   // A solve that takes less of a frame's time is done at once.
   constexpr double kAtOnce = 1.0 / 3;
   // Other machines, and other work on this one.
-  constexpr double kMargin = 2;
+  constexpr double kMargin = 4;
   const double frames = learner.solve_seconds(options.window_size) * options.frame_rate;
   if (!(frames > kAtOnce)) return 0;
   return static_cast<int>(
@@ -50,9 +51,10 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
     layout.bytes = UINT64_MAX;
     return layout;
   }
+  if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
+  const uint64_t masks = Decision::bytes(width, height) + layout.soft_bytes;
   layout.bytes = saturating_sum(
-      saturating_sum(saturating_sum(layout.store_bytes, Decision::bytes(width, height)),
-                     options.caller_bytes),
+      saturating_sum(saturating_sum(layout.store_bytes, masks), options.caller_bytes),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
                     Workers::count(options.threads)));
   return layout;
@@ -103,6 +105,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
       !(options.foreground_threshold >= 0))
     return {Code::invalid_options,
             "rank, omega-threshold and foreground-threshold must not be negative"};
+  if (options.mask_softness < 0 || options.mask_softness > kMostSoftness)
+    return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};

@@ -24,6 +24,7 @@ struct EngineOptions : LearnOptions {
   Colours colours = Colours::rgb;           // of the frames
   DecisionSteps steps;                      // of masks
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
+  int mask_softness = 0;                    // pixels, Engine::set_mask_softness()
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
@@ -40,6 +41,7 @@ struct EngineLayout {
   int sample_step = 1;
   uint64_t frame_bytes = 0;  // of the planes of the frames that are kept
   uint64_t store_bytes = 0;  // of these and of all that belongs to a frame
+  uint64_t soft_bytes = 0;   // of soft masks
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
 EngineLayout layout_of(const EngineOptions& options, int width, int height);

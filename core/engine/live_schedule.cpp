@@ -34,6 +34,10 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (!frozen) begin_work();
   if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
+  if (background().state() == State::learnt && background().known())
+    background().mend(
+        SnapshotRange(frames().window()).newest(std::min(frames().size(), Learner::kMendingFrames)),
+        time());
   if (background().solves() > solves) published_ = {time(), background().model().light()};
   pace().count_frame();
   queue->pending = queue->ready = 1;

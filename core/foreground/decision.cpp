@@ -194,6 +194,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     specks_.take_out(of_.mask.data(), 255, area(constants().least_foreground), true);
     specks_.take_out(of_.mask.data(), 0, area(constants().least_hole), false);
   }
+  // Pixels around it may have overruled some.
+  if (frame.ignored) frame.ignored->clear_rows(0, shape_.height, shape_.width, of_.mask.data());
   if (learns) {
     in_bands(shape_.height, parts, [&](int first, int size) { learn(first, size); });
     noise_.end_frame();
@@ -248,6 +250,7 @@ void Decision::compare(int first_row, int row_count) {
         foreground_mask(x, level, count, now_.threshold, nullptr, differing_row(y) + left);
     }
     for (int c = 0; c < kChannels; ++c) repeat_border(level_row(c, y));
+    if (now_.frame.ignored) now_.frame.ignored->clear(y, 0, shape_.width, differing_row(y));
     repeat_border(differing_row(y));
   }
 }
@@ -268,6 +271,7 @@ void Decision::compare_means(int first_row, int row_count) {
       for (int p = 0; p < run.count; ++p)
         row[left + p] = run.own[p] > most && run.nearest[p] > alone ? 255 : 0;
     }
+    if (now_.frame.ignored) now_.frame.ignored->clear(y, 0, shape_.width, row);
     repeat_border(row);
   }
 }
@@ -355,7 +359,13 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
       std::copy_n(run.limit + p, size, limit);
       raise_limit(noise + p, of_textures, size, limit);
       keep_beyond(run.nearest + p, limit, size, foreground + p);
+      uint16_t known[kLongestRun];
+      std::copy_n(noise + p, size, known);
       learn_distance(run.nearest + p, size, texture_.share(cell), noise + p);
+      if (now_.frame.ignored)
+        now_.frame.ignored->visit(y, left + p, end - p, [&](int64_t first, int64_t last) {
+          std::copy(known + first, known + last, noise + p + first);
+        });
     } else if (moving) {
       raise_limit(noise + p, factor, size, run.limit + p);
       keep_beyond(run.own + p, run.limit + p, size, foreground + p);
@@ -455,6 +465,11 @@ void Decision::learn(int first_row, int row_count) {
                   end = std::min(grid.left(col + 1) - left, run.count);
         for (int p = begin; p < end; ++p) wide[p] = 255, now[p] = 0;
       }
+      if (now_.frame.ignored)
+        now_.frame.ignored->visit(y, left, run.count, [&](int64_t begin, int64_t end) {
+          std::fill(wide + begin, wide + end, uint8_t{255});
+          std::fill(now + begin, now + end, uint8_t{0});
+        });
       noise_.learn(y, static_cast<size_t>(left), static_cast<size_t>(run.count), run.own, run.limit,
                    wide, now);
     }

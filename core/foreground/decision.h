@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/foreground/decision_steps.h"
+#include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/specks.h"
@@ -30,6 +31,8 @@ struct Comparison {
   const uint8_t* limits = nullptr;  // the same of each pixel, where that is more; or null
   // Somebody asked for this threshold: it holds in textures that move, too.
   bool fixed = false;
+  // Where all is background, whatever the frame shows, and nothing is learnt from it; or null.
+  const IgnoredAreas* ignored = nullptr;
 };
 
 // A pixel that differs from L is foreground unless

@@ -8,6 +8,7 @@
 
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
+#include "core/passes/soft_edge.h"
 
 namespace qdmd {
 namespace {
@@ -18,9 +19,15 @@ struct BackgroundRun {
   uint8_t* const rows[3] = {level[0], level[1], level[2]};
 };
 
-// The mask, grey where only light differs.
+// The mask, at least grey where only light differs.
 void mark(const uint8_t* mask, const uint8_t* shaded, size_t count, uint8_t* out) {
-  for (size_t p = 0; p < count; ++p) out[p] = mask[p] | (shaded[p] & 127);
+  for (size_t p = 0; p < count; ++p)
+    out[p] = std::max(mask[p], static_cast<uint8_t>(shaded[p] & 127));
+}
+
+// 255 where a mask is not 0.
+void touch(const uint8_t* mask, size_t count, uint8_t* out) {
+  for (size_t p = 0; p < count; ++p) out[p] = mask[p] ? 255 : 0;
 }
 
 }  // namespace
@@ -28,7 +35,8 @@ void mark(const uint8_t* mask, const uint8_t* shaded, size_t count, uint8_t* out
 double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold) {
+                                           double fixed_threshold, const IgnoredAreas& ignored,
+                                           int width) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
@@ -48,7 +56,11 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       const size_t first = run * kMaxRun;
       const size_t count = std::min(kMaxRun, snapshots.pixels() - first);
       model.evaluate(first, count, background.rows);
+      uint8_t counts[kMaxRun];
+      std::fill_n(counts, count, uint8_t{1});
+      ignored.clear_run(first, count, width, counts);
       for (size_t p = 0; p < count; ++p) {
+        if (!counts[p]) continue;
         int squared = 0;
         for (int c = 0; c < kChannels; ++c) {
           const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
@@ -58,8 +70,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
         const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
         ++histogram[bin];
         if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
+        ++total;
       }
-      total += count;
     }
   }
 
@@ -82,7 +94,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count) {
   BackgroundRun background;
-  alignas(64) uint8_t made[3][kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun];
+  alignas(64) uint8_t made[3][kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun], touched[kMaxRun];
+  const bool has_alpha = out.alpha && !out.alpha_is_padding;
   if (out.alpha)
     std::memset(constant_alpha, out.alpha_is_padding ? 255 : task.constant_alpha, kMaxRun);
   const auto image_width = static_cast<size_t>(out.width);
@@ -114,13 +127,22 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
           }
           break;
         case Output::cutout:
-          for (int c = 0; c < kChannels; ++c) apply_mask(x[c], mask, count, made[c]);
+          // Where alpha fades, colours do not: who composites multiplies them.
+          if (task.soft && has_alpha) touch(mask, count, touched);
+          for (int c = 0; c < kChannels; ++c)
+            if (task.soft && !has_alpha)
+              fade(x[c], mask, task.black[c], count, made[c]);
+            else
+              apply_mask(x[c], task.soft ? touched : mask, count, made[c]);
           break;
       }
       const uint8_t* own = constant_alpha;
       if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
-      if (task.output == Output::cutout && out.alpha && !out.alpha_is_padding) {
-        apply_mask(own, mask, count, alpha);
+      if (task.output == Output::cutout && has_alpha) {
+        if (task.soft)
+          fade(own, mask, 0, count, alpha);
+        else
+          apply_mask(own, mask, count, alpha);
         own = alpha;
       }
       join_channels(channels, own, count, out, first_row + static_cast<int>(row),

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/base/image_view.h"
+#include "core/foreground/ignored.h"
 #include "core/model/background_model.h"
 
 namespace qdmd {
@@ -10,7 +11,9 @@ enum class Output {
   background,  // L(t)
   foreground,  // |x - L| per channel
   mask,        // white where Decision says foreground, else black
-  cutout       // the frame where the mask is white, elsewhere black (transparent with alpha)
+  // The frame where the mask is white, elsewhere black (transparent with alpha); where the mask is
+  // soft, what is in between.
+  cutout
 };
 
 struct ForegroundStatistics {
@@ -26,21 +29,26 @@ double automatic_threshold(double noise);
 // their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
 // `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
-// Leaves the model's time at the last sampled snapshot.
+// Leaves the model's time at the last sampled snapshot. Pixels of snapshots, `width` wide, that are
+// ignored say nothing.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold);
+                                           double fixed_threshold, const IgnoredAreas& ignored = {},
+                                           int width = 1);
 
 // One frame of a window and what its pictures are made of.
 struct OutputTask {
   const uint8_t* x[3];           // the frame's planes
   const BackgroundModel* model;  // at the frame's time
   Output output;
-  // Of mask and cutout: 255 where foreground, else 0; and 255 where the mask's picture is to be
-  // 127, or null.
+  // Of mask and cutout: 255 where foreground, else 0, or in between if it is soft; and 255 where
+  // the mask's picture is to be 127 at least, or null.
   const uint8_t* mask;
   const uint8_t* shaded;
   const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
   uint8_t constant_alpha;  // this
+  bool soft = false;       // the mask
+  // Samples of black.
+  uint8_t black[3] = {0, 0, 0};
 };
 
 // Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write

@@ -84,7 +84,7 @@ class SnapshotRange {
   int size() const { return size_; }
   size_t pixels() const { return planes_->pixels(); }
   size_t plane_size() const { return planes_->plane_size(); }
-  int slot(int index) const { return (first_slot_ + index) % planes_->capacity(); }
+  int slot(int index) const { return (first_slot_ + index * stride_) % planes_->capacity(); }
   const uint8_t* plane(int index, int channel) const {
     return planes_->plane(slot(index), channel);
   }
@@ -96,6 +96,13 @@ class SnapshotRange {
     range.size_ = count;
     return range;
   }
+  // Every stride-th of them, the first included.
+  SnapshotRange every(int stride) const {
+    SnapshotRange range = *this;
+    range.stride_ *= stride;
+    range.size_ = (size_ + stride - 1) / stride;
+    return range;
+  }
   // What `planes`, of the same capacity, have in the same slots.
   SnapshotRange in(const PlaneSlots& planes) const {
     SnapshotRange range = *this;
@@ -105,7 +112,7 @@ class SnapshotRange {
 
  private:
   const PlaneSlots* planes_;
-  int first_slot_, size_;
+  int first_slot_, size_, stride_ = 1;
 };
 
 }  // namespace qdmd

@@ -100,6 +100,14 @@ class Learner {
   // That model is now the one in use.
   virtual void publish() {}
 
+  // ---- What was uncovered ----
+
+  // Live, after each frame that is compared with the background in use, `model` at time t:
+  // `newest` are the newest frames, that one last. Where they show that something has left that
+  // `model` took for background, it has what was behind from now on.
+  static constexpr int kMendingFrames = 9;  // as many as there are, but no more than these
+  virtual void mend(const SnapshotRange& /*newest*/, double /*t*/, BackgroundModel* /*model*/) {}
+
   // ---- Light ----
 
   // True where the background in use is to have the light() of each frame.

@@ -45,6 +45,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
   frozen_ = false;
+  stride_ = 1;
   gains_.clear();
   limits_.clear();
   planes_.clear();
@@ -99,7 +100,7 @@ void BackgroundModel::set_time(double t) {
       for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gains_.front()[c];
     return;
   }
-  model_.weights(t, &time_weights_);
+  model_.weights(t / stride_, &time_weights_);
   if (!gains_.empty()) {
     const auto last = static_cast<double>(gains_.size() - 1);
     const Gain& gain = gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
@@ -160,6 +161,10 @@ void BackgroundModel::freeze_at(double t) {
   frozen_ = true;
   gains_.clear();
   weights_.assign(kIdentity.begin(), kIdentity.end());
+}
+
+void BackgroundModel::replace(size_t first, size_t count, const uint8_t* const level[3]) {
+  for (size_t c = 0; c < kChannels; ++c) std::copy_n(level[c], count, pictures_[c] + first);
 }
 
 void BackgroundModel::make_room(size_t pixels, bool limits) {

@@ -30,8 +30,10 @@ class BackgroundModel {
   // A slice from other samples than the snapshots': planes[j] begins with pixel `first` and can be
   // read up to the next multiple of 64 samples. Not where the combination is direct.
   void build_from(const uint8_t* const* planes, size_t first, size_t count);
-  // Of the snapshots: L(t) is multiplied by them, at other times by the nearest one. Kept until
-  // begin().
+  // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
+  void set_stride(int frames) { stride_ = frames; }
+  // Of the frames from the first snapshot on: L(t) is multiplied by them, at other times by the
+  // nearest one. Kept until begin().
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
   // For set_time() from now on, in place of the snapshots' gains.
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
@@ -71,6 +73,9 @@ class BackgroundModel {
   // Where it throws, all is as it was.
   void make_room(size_t pixels, bool limits);
 
+  // Of one that is frozen: pixels first .. first + count - 1 are these, in unit light.
+  void replace(size_t first, size_t count, const uint8_t* const level[3]);
+
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);
   // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one
@@ -88,6 +93,7 @@ class BackgroundModel {
   TemporalModel model_;
   Eigen::MatrixXd basis_, time_weights_, direct_weights_;
   bool direct_ = false, frozen_ = false;
+  int stride_ = 1;
   size_t pixels_ = 0;
   std::vector<const uint8_t*> planes_;  // of the snapshots, in time order
   std::vector<double>

@@ -33,9 +33,11 @@ void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
   for (size_t i = 0; i < count; ++i) masked[i] = static_cast<uint16_t>(masked[i] + (keep[i] == 0));
 }
 
-// `from` in unit light where kept, else 0.
+// `from` in unit light where kept, else 0. next: what the next call reads; planes are too many
+// streams for the hardware to foresee.
 void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep, size_t count,
-              float factor, uint8_t* HWY_RESTRICT out) {
+              float factor, const uint8_t* next, uint8_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; i += 64) hwy::Prefetch(next + i);
   if (factor == 1) {
     for (size_t i = 0; i < count; ++i) out[i] = from[i] & keep[i];
     return;
@@ -43,88 +45,113 @@ void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep
   for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor) & keep[i];
 }
 
-// How many of `planes` rows of samples, `stride` apart, are below `limit`, by lanes. Samples are
-// counted in bytes, as far as these can count.
-template <bool kEqual, class V>
-HWY_INLINE void count_below(const uint8_t* samples, size_t stride, size_t planes, V limit,
-                            uint16_t* below) {
+// The samples of all planes at as many pixels as a vector has, `stride` apart.
+struct Column {
+  const uint8_t* samples;
+  size_t stride, planes;
+
+  hn::Vec<Bytes> at(size_t t) const { return hn::LoadU(Bytes(), samples + t * stride); }
+};
+
+// Counts in bytes, as far as these can count: part(t, first, second) adds to them what plane t has.
+// total: of as many as are wanted, 1 or 2.
+template <size_t kCounts, class Part>
+HWY_INLINE void count_samples(size_t planes, uint16_t (*total)[64], Part part) {
   const Bytes d;
-  std::memset(below, 0, hn::Lanes(d) * sizeof(*below));
-  HWY_ALIGN uint8_t part[64];
+  std::memset(total, 0, kCounts * sizeof(*total));
   for (size_t t = 0; t < planes;) {
     const size_t end = std::min(planes, t + 255);
-    auto count = hn::Zero(d);
-    for (; t < end; ++t) {
-      const auto x = hn::LoadU(d, samples + t * stride);
-      const auto is_below = kEqual ? hn::Not(hn::Gt(x, limit)) : hn::Lt(x, limit);
-      count = hn::Sub(count, hn::VecFromMask(d, is_below));
-    }
-    hn::Store(count, d, part);
-    for (size_t i = 0; i < hn::Lanes(d); ++i) below[i] = static_cast<uint16_t>(below[i] + part[i]);
+    auto first = hn::Zero(d), second = hn::Zero(d);
+    for (; t < end; ++t) part(t, first, second);
+    HWY_ALIGN uint8_t counted[64];
+    hn::Store(first, d, counted);
+    for (size_t i = 0; i < hn::Lanes(d); ++i)
+      total[0][i] = static_cast<uint16_t>(total[0][i] + counted[i]);
+    if (kCounts == 1) continue;
+    hn::Store(second, d, counted);
+    for (size_t i = 0; i < hn::Lanes(d); ++i)
+      total[kCounts - 1][i] = static_cast<uint16_t>(total[kCounts - 1][i] + counted[i]);
   }
 }
 
 // The median of each pixel's samples that are not masked, the mean of the middle two rounded down
-// where their number is even. samples: `planes` rows, `stride` apart, 0 where masked. level: what
-// it is where all are masked. count: a multiple of 64. The median's bits are found from the highest
-// down: a bit is set where no more samples lie below than half.
-void median_row(const uint8_t* samples, size_t stride, size_t planes,
-                const uint16_t* HWY_RESTRICT masked, size_t count, uint8_t* HWY_RESTRICT level) {
+// where their number is even; 0 where masked. level: near what it is; stays where all are masked.
+// masked: how many are. The median's bits are found from the highest down: a bit is set where no
+// more samples lie below than half. Where the median of no pixel is far from `level`, that begins
+// near it.
+void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
+                 uint8_t* HWY_RESTRICT level) {
+  constexpr int kNear = 8;
   const Bytes d;
   const size_t lanes = hn::Lanes(d);
   HWY_ALIGN uint8_t median[64], candidate[64], upper[64];
-  HWY_ALIGN uint16_t below[64], rank[64];
-  const auto all = static_cast<uint16_t>(planes);
-  for (size_t first = 0; first < count; first += lanes) {
-    const uint8_t* x = samples + first;
-    const uint16_t* zeros = masked + first;
-    for (size_t i = 0; i < lanes; ++i) {
-      median[i] = 0;
-      rank[i] = static_cast<uint16_t>(zeros[i] + std::max(all - zeros[i] - 1, 0) / 2);
-    }
-    for (int bit = 128; bit > 0; bit /= 2) {
-      for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<uint8_t>(median[i] | bit);
-      count_below<false>(x, stride, planes, hn::Load(d, candidate), below);
-      for (size_t i = 0; i < lanes; ++i) median[i] = below[i] <= rank[i] ? candidate[i] : median[i];
-    }
-    // The upper of the middle two is the same, or the least sample above.
-    const auto lower = hn::Load(d, median);
-    count_below<true>(x, stride, planes, lower, below);
-    auto least = hn::Set(d, 255);
-    for (size_t t = 0; t < planes; ++t) {
-      const auto sample = hn::LoadU(d, x + t * stride);
-      least = hn::IfThenElse(hn::Gt(sample, lower), hn::Min(least, sample), least);
-    }
-    hn::Store(least, d, upper);
-    for (size_t i = 0; i < lanes; ++i) {
-      if (zeros[i] == all) continue;
-      const int number = all - zeros[i];
-      const bool next = number % 2 == 0 && below[i] == zeros[i] + number / 2;
-      level[first + i] = static_cast<uint8_t>((median[i] + (next ? upper[i] : median[i])) / 2);
-    }
+  HWY_ALIGN uint16_t below[2][64], rank[64];
+  const auto all = static_cast<uint16_t>(column.planes);
+  for (size_t i = 0; i < lanes; ++i) {
+    median[i] = static_cast<uint8_t>(std::clamp(level[i] - kNear / 2, 0, 256 - kNear));
+    rank[i] = static_cast<uint16_t>(masked[i] + std::max(all - masked[i] - 1, 0) / 2);
+  }
+  const auto low = hn::Load(d, median), high = hn::Add(low, hn::Set(d, kNear - 1));
+  count_samples<2>(column.planes, below, [&](size_t t, auto& under, auto& up_to) HWY_ATTR {
+    const auto x = column.at(t);
+    under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(x, low)));
+    up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(hn::Gt(x, high))));
+  });
+  int far = 0;
+  for (size_t i = 0; i < lanes; ++i)
+    far |= static_cast<int>(masked[i] != all) &
+           (static_cast<int>(below[0][i] > rank[i]) | static_cast<int>(below[1][i] <= rank[i]));
+  if (far) std::memset(median, 0, sizeof(median));
+  for (int bit = far ? 128 : kNear / 2; bit > 0; bit /= 2) {
+    for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<uint8_t>(median[i] + bit);
+    const auto limit = hn::Load(d, candidate);
+    count_samples<1>(column.planes, below, [&](size_t t, auto& under, auto&) HWY_ATTR {
+      under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(column.at(t), limit)));
+    });
+    for (size_t i = 0; i < lanes; ++i)
+      median[i] = below[0][i] <= rank[i] ? candidate[i] : median[i];
+  }
+  // The upper of the middle two is the same, or the least sample above.
+  const auto lower = hn::Load(d, median);
+  auto least = hn::Set(d, 255);
+  count_samples<1>(column.planes, below, [&](size_t t, auto& up_to, auto&) HWY_ATTR {
+    const auto x = column.at(t);
+    const auto above = hn::Gt(x, lower);
+    up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(above)));
+    least = hn::IfThenElse(above, hn::Min(least, x), least);
+  });
+  hn::Store(least, d, upper);
+  for (size_t i = 0; i < lanes; ++i) {
+    if (masked[i] == all) continue;
+    const int number = all - masked[i];
+    const bool next = number % 2 == 0 && below[0][i] == masked[i] + number / 2;
+    level[i] = static_cast<uint8_t>((median[i] + (next ? upper[i] : median[i])) / 2);
   }
 }
 
-// Samples that are not kept become the level; others come as near to it as reach. count: a multiple
-// of 64.
-void draw_row(const uint8_t* HWY_RESTRICT level, const uint8_t* HWY_RESTRICT reach,
-              const uint8_t* HWY_RESTRICT keep, size_t count, uint8_t* HWY_RESTRICT samples) {
+// Samples, `planes` rows of them `stride` apart and 0 where not kept, of `count` pixels, a multiple
+// of 64: what is not kept becomes the median of the others, or stays at `level` where there are
+// none; others come as near to it as reach, or stay where there is no reach. keep: rows
+// `keep_stride` apart. level: near the medians, which it becomes.
+void fill_rows(uint8_t* samples, size_t stride, size_t planes, const uint8_t* keep,
+               size_t keep_stride, const uint16_t* masked, const uint8_t* reach, size_t count,
+               uint8_t* level) {
   const Bytes d;
-  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto x = hn::LoadU(d, samples + i), l = hn::LoadU(d, level + i);
-    const auto above = hn::SaturatedSub(x, l), below = hn::SaturatedSub(l, x);
-    const auto limit = hn::And(hn::LoadU(d, reach + i), hn::LoadU(d, keep + i));
-    const auto up = hn::Min(above, limit), down = hn::Min(below, limit);
-    // One of them is 0.
-    hn::StoreU(hn::Sub(hn::Add(l, up), down), d, samples + i);
+  for (size_t first = 0; first < count; first += hn::Lanes(d)) {
+    take_median({samples + first, stride, planes}, masked + first, level + first);
+    // While the samples are in the first cache.
+    const auto l = hn::LoadU(d, level + first);
+    const auto most = reach ? hn::LoadU(d, reach + first) : hn::Set(d, 255);
+    for (size_t t = 0; t < planes; ++t) {
+      uint8_t* at = samples + t * stride + first;
+      const auto x = hn::LoadU(d, at);
+      const auto limit = hn::And(most, hn::LoadU(d, keep + t * keep_stride + first));
+      const auto up = hn::Min(hn::SaturatedSub(x, l), limit);
+      const auto down = hn::Min(hn::SaturatedSub(l, x), limit);
+      // One of them is 0.
+      hn::StoreU(hn::Sub(hn::Add(l, up), down), d, at);
+    }
   }
-}
-
-// Samples that are not kept become the level.
-void fill_row(const uint8_t* HWY_RESTRICT level, const uint8_t* HWY_RESTRICT keep, size_t count,
-              uint8_t* HWY_RESTRICT samples) {
-  for (size_t i = 0; i < count; ++i)
-    samples[i] = static_cast<uint8_t>(samples[i] | (level[i] & static_cast<uint8_t>(~keep[i])));
 }
 
 }  // namespace HWY_NAMESPACE
@@ -137,9 +164,7 @@ namespace {
 
 HWY_EXPORT(expand_bits);
 HWY_EXPORT(take_row);
-HWY_EXPORT(median_row);
-HWY_EXPORT(draw_row);
-HWY_EXPORT(fill_row);
+HWY_EXPORT(fill_rows);
 
 constexpr size_t kUnit = 64;
 // Of samples and what is kept of them.
@@ -187,44 +212,40 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
   std::fill_n(masked_.data(), padded, uint16_t{0});
   for (size_t t = 0; t < m; ++t) {
     uint8_t* keep = keep_.data() + t * run_;
-    const int snapshot = static_cast<int>(t);
+    const int snapshot = static_cast<int>(t), next = std::min(snapshot + 1, snapshots.size() - 1);
     HWY_DYNAMIC_DISPATCH(expand_bits)(mask.of(snapshot) + first / 8, padded, keep, masked_.data());
     for (size_t c = 0; c < kChannels; ++c) {
       const float gain = gains[t][c];
+      const int channel = static_cast<int>(c);
       // Planes are padded like runs.
       HWY_DYNAMIC_DISPATCH(take_row)
-      (snapshots.plane(snapshot, static_cast<int>(c)) + first, keep, padded,
-       gain == 1 ? 1 : 1 / gain, samples_.data() + (kChannels * t + c) * run_);
+      (snapshots.plane(snapshot, channel) + first, keep, padded, gain == 1 ? 1 : 1 / gain,
+       snapshots.plane(next, channel) + first, samples_.data() + (kChannels * t + c) * run_);
     }
   }
   uint8_t* level = samples_.data() + m * kChannels * run_;
   for (size_t c = 0; c < kChannels; ++c) {
     std::memcpy(level, reference.level[c].data() + first, count);
     std::memset(level + count, 0, padded - count);
-    HWY_DYNAMIC_DISPATCH(median_row)
-    (samples_.data() + c * run_, kChannels * run_, m, masked_.data(), padded, level);
-    for (size_t t = 0; t < m; ++t) {
-      const uint8_t* keep = keep_.data() + t * run_;
-      uint8_t* samples = samples_.data() + (kChannels * t + c) * run_;
-      if (reach)
-        HWY_DYNAMIC_DISPATCH(draw_row)(level, reach + first, keep, padded, samples);
-      else
-        HWY_DYNAMIC_DISPATCH(fill_row)(level, keep, padded, samples);
-    }
+    HWY_DYNAMIC_DISPATCH(fill_rows)
+    (samples_.data() + c * run_, kChannels * run_, m, keep_.data(), run_, masked_.data(),
+     reach ? reach + first : nullptr, padded, level);
   }
   return planes_.data();
 }
 
 void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
+  const bool lit = is_lit(gain);
   size_t sample = 0;
   for (int row = 0; row < reference.height; row += step)
     for (int col = 0; col < reference.width; col += step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
+      const int limit = is_masked(bits, p) ? 0 : reach[p];
       for (size_t c = 0; c < 3; ++c) {
-        const int level = reference.level[c][p], limit = is_masked(bits, p) ? 0 : reach[p];
-        const int unit = out_of_light(x[c][p], gain[c]);
+        const int level = reference.level[c][p];
+        const int unit = lit ? out_of_light(x[c][p], gain[c]) : x[c][p];
         out[c][sample] = static_cast<uint8_t>(std::clamp(unit, level - limit, level + limit));
       }
     }

@@ -1,9 +1,49 @@
 #include "core/passes/grid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/grid.cpp"
+#include "core/passes/simd.h"
+
+HWY_BEFORE_NAMESPACE();
 namespace qdmd {
+namespace HWY_NAMESPACE {
+
+// Columns that are summed together, at most: as long runs as memory likes.
+constexpr size_t kColumns = 2048;
+
+// The sums of `count` <= kColumns columns of `rows` rows, `stride` apart. Plain loops, which the
+// compiler makes vectors of.
+void sum_columns(const uint8_t* samples, size_t stride, size_t rows, size_t count,
+                 uint32_t* HWY_RESTRICT sums) {
+  // So many samples fit 16 bits.
+  constexpr size_t kRows = 257;
+  HWY_ALIGN uint16_t narrow[kColumns];
+  for (size_t x = 0; x < count; ++x) sums[x] = 0;
+  for (size_t top = 0; top < rows; top += kRows) {
+    for (size_t x = 0; x < count; ++x) narrow[x] = 0;
+    for (size_t y = top; y < std::min(rows, top + kRows); ++y) {
+      const uint8_t* HWY_RESTRICT from = samples + y * stride;
+      for (size_t x = 0; x < count; ++x) narrow[x] = static_cast<uint16_t>(narrow[x] + from[x]);
+    }
+    for (size_t x = 0; x < count; ++x) sums[x] += narrow[x];
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+namespace {
+
+HWY_EXPORT(sum_columns);
+
+}  // namespace
 
 Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(height_) {
   const int side = std::max(
@@ -15,31 +55,31 @@ Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(hei
 
 void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
-  constexpr int kColumns = 512;
-  uint32_t sums[kColumns];
+  constexpr int kColumns = 2048;
+  alignas(64) uint32_t sums[kColumns];
+  std::array<int, 2 * kMostCellsAlong + 1> left;
+  for (int col = 0; col <= grid.cols; ++col) left[static_cast<size_t>(col)] = grid.left(col);
   for (int row = 0; row < grid.rows; ++row) {
-    const int top = grid.top(row), bottom = grid.top(row + 1);
-    int col = 0;
+    const int top = grid.top(row), height = grid.top(row + 1) - top;
+    const int* next = left.data() + 1;  // where the cell ends
     uint64_t cell = 0;
     for (int first = 0; first < grid.width; first += kColumns) {
       const int count = std::min(kColumns, grid.width - first);
-      std::fill_n(sums, count, 0u);
-      for (int y = top; y < bottom; ++y) {
-        const uint8_t* samples = plane + static_cast<ptrdiff_t>(y) * grid.width + first;
-        for (int x = 0; x < count; ++x) sums[x] += samples[x];
-      }
+      HWY_DYNAMIC_DISPATCH(sum_columns)
+      (plane + static_cast<ptrdiff_t>(top) * grid.width + first, static_cast<size_t>(grid.width),
+       static_cast<size_t>(height), static_cast<size_t>(count), sums);
       // A cell may end in these columns or go on in the next.
       for (int x = 0; x < count;) {
-        const int end = std::min(count, grid.left(col + 1) - first);
+        const int end = std::min(count, *next - first);
         for (; x < end; ++x) cell += sums[x];
-        if (first + x < grid.left(col + 1)) break;
-        const int pixels = (bottom - top) * (grid.left(col + 1) - grid.left(col));
-        *means++ = static_cast<float>(static_cast<double>(cell) / pixels);
+        if (first + x < *next) break;
+        *means++ = static_cast<float>(static_cast<double>(cell) / (height * (next[0] - next[-1])));
         cell = 0;
-        ++col;
+        ++next;
       }
     }
   }
 }
 
 }  // namespace qdmd
+#endif

@@ -102,11 +102,10 @@ constexpr size_t kBitsRead = 64;
 
 constexpr int kMeanReach = 2, kMajorityReach = 3;  // pixels around one that judge it with it
 
-// `row` with `reach` more samples at both ends, which repeat its first and last.
-void pad_row(const uint8_t* row, size_t width, size_t reach, uint8_t* padded) {
-  std::memset(padded, row[0], reach);
-  std::memcpy(padded + reach, row, width);
-  std::memset(padded + reach + width, row[width - 1], reach);
+// Repeats the first and the last of `width` samples that begin at padded[reach].
+void pad_ends(size_t width, size_t reach, uint8_t* padded) {
+  std::memset(padded, padded[reach], reach);
+  std::memset(padded + reach + width, padded[reach + width - 1], reach);
 }
 
 // The last 2 kReach + 1 rows of a picture.
@@ -135,7 +134,7 @@ using CountRing = RowRing<uint8_t, kMajorityReach>;
 
 size_t mask_scratch_bytes(int width, int height) {
   const auto w = static_cast<size_t>(width);
-  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 5 * w +
+  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 3 * w +
                        (w + 2 * kMajorityReach) + w * static_cast<size_t>(height) + kBitsRead;
   // The next thread's begins at an even address, too.
   return bytes + bytes % 2;
@@ -151,8 +150,7 @@ void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain
   SumRing sums(reinterpret_cast<uint16_t*>(take(2 * width * SumRing::kRows)), width);
   CountRing counts(take(width * CountRing::kRows), width);
   uint8_t* const lit_rows[3] = {take(width), take(width), take(width)};
-  uint8_t *const norm = take(width), *const exceeds = take(width),
-                 *const padded = take(width + 2 * kMajorityReach);
+  uint8_t* const padded = take(width + 2 * kMajorityReach);
   uint8_t* const mask = take(pixels + kBitsRead);
 
   const auto add_norm = [&](int row) {
@@ -165,15 +163,15 @@ void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain
       l[c] = lit_rows[c];
     }
     const uint8_t* const row_of_x[3] = {x[0] + start, x[1] + start, x[2] + start};
-    residual_norm(row_of_x, l, width, norm);
-    pad_row(norm, width, kMeanReach, padded);
+    residual_norm(row_of_x, l, width, padded + kMeanReach);
+    pad_ends(width, kMeanReach, padded);
     HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, sums.of(row));
   };
   const auto add_count = [&](int row) {
     HWY_DYNAMIC_DISPATCH(exceed_row)
     (sums.around(row, height).data(), reference.threshold.data() + static_cast<size_t>(row) * width,
-     width, exceeds);
-    pad_row(exceeds, width, kMajorityReach, padded);
+     width, padded + kMajorityReach);
+    pad_ends(width, kMajorityReach, padded);
     HWY_DYNAMIC_DISPATCH(sum_seven_columns)(padded, width, counts.of(row));
   };
   int norms = 0, counted = 0;
@@ -232,7 +230,8 @@ void blur(const uint8_t* plane, int width, int height, uint8_t* out) {
   int next = 0;
   for (int row = 0; row < height; ++row) {
     for (; next < std::min(height, row + kMeanReach + 1); ++next) {
-      pad_row(plane + static_cast<size_t>(next) * w, w, kMeanReach, padded.data());
+      std::memcpy(padded.data() + kMeanReach, plane + static_cast<size_t>(next) * w, w);
+      pad_ends(w, kMeanReach, padded.data());
       HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded.data(), w, ring.of(next));
     }
     HWY_DYNAMIC_DISPATCH(sum_five_rows)(ring.around(row, height).data(), w, total.data());

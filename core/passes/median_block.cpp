@@ -1,10 +1,12 @@
 #include "core/passes/median_block.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "core/base/channels.h"
+#include "core/passes/median_network.h"
+#include "core/passes/residual.h"
 #include "core/passes/unit_light.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -14,79 +16,34 @@
 HWY_BEFORE_NAMESPACE();
 namespace qdmd {
 namespace HWY_NAMESPACE {
-namespace {
 
-// Pixels that are sorted side by side.
+namespace hn = hwy::HWY_NAMESPACE;
+
 constexpr size_t kRun = kMedianBlock;
-// kMedianFrames and one that is never taken: a power of two.
-constexpr size_t kMost = 32;
+// Whole vectors of every instruction set.
+constexpr size_t kUnit = 64;
 
-// Sorts `count` samples, a power of two, of each of kRun pixels: Batcher's odd-even merge sort,
-// whose comparisons do not depend on the samples. Plain loops, which the compiler makes vectors of.
-void sort_samples(uint8_t (*samples)[kRun], size_t count) {
-  for (size_t p = 1; p < count; p *= 2)
-    for (size_t k = p; k >= 1; k /= 2)
-      for (size_t j = k % p; j + k < count; j += 2 * k)
-        for (size_t i = 0; i < std::min(k, count - j - k); ++i) {
-          if ((i + j) / (2 * p) != (i + j + k) / (2 * p)) continue;
-          uint8_t* HWY_RESTRICT low = samples[i + j];
-          uint8_t* HWY_RESTRICT high = samples[i + j + k];
-          for (size_t x = 0; x < kRun; ++x) {
-            const uint8_t a = low[x], b = high[x];
-            low[x] = a < b ? a : b;
-            high[x] = a < b ? b : a;
-          }
-        }
-}
-
-// The median of count <= kMost samples of each pixel; the mean of the middle two, rounded up, where
-// count is even. Sorts them.
-void take_median(uint8_t (*samples)[kRun], size_t count, uint8_t* median) {
-  size_t room = 1;
-  while (room < count) room *= 2;
-  for (size_t i = count; i < room; ++i) std::memset(samples[i], 255, kRun);
-  sort_samples(samples, room);
-  const uint8_t* low = samples[(count - 1) / 2];
-  const uint8_t* high = samples[count / 2];
-  for (size_t x = 0; x < kRun; ++x) median[x] = static_cast<uint8_t>((low[x] + high[x] + 1) / 2);
-}
-
-}  // namespace
-
-void block(const uint8_t* const* rows, const float* inverse, size_t count, size_t width,
-           size_t height, size_t stride, uint8_t* const* background, uint8_t* spread) {
-  alignas(64) uint8_t samples[kChannels][kMost][kRun], sorted[kMost][kRun], median[kChannels][kRun];
-  const auto scatter = [&](const uint8_t* from, uint8_t* to) {
-    for (size_t y = 0; y < height; ++y) std::memcpy(to + y * stride, from + y * width, width);
-  };
-  const size_t used = width * height;
-  for (size_t c = 0; c < kChannels; ++c) {
-    for (size_t i = 0; i < count; ++i) {
-      const uint8_t* from = rows[kChannels * i + c];
-      uint8_t* to = samples[c][i];
-      for (size_t y = 0; y < height; ++y) std::memcpy(to + y * width, from + y * stride, width);
-      std::memset(to + used, 0, kRun - used);
-      const float factor = inverse[kChannels * i + c];
-      if (factor == 1) continue;
-      for (size_t x = 0; x < kRun; ++x) to[x] = in_light(to[x], factor);
+// The medians of rows of `count` samples, a multiple of kUnit; the mean of the middle two, rounded
+// up, where there are two. Leaves the samples in another order.
+void take_median(const MedianNetwork<16>& network, size_t count, uint8_t (*samples)[kRun],
+                 uint8_t* median) {
+  const hn::CappedTag<uint8_t, kUnit> d;
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
+    for (const auto& [smaller, larger] : network) {
+      uint8_t *low = samples[smaller] + i, *high = samples[larger] + i;
+      const auto a = hn::Load(d, low), b = hn::Load(d, high);
+      hn::Store(hn::Min(a, b), d, low);
+      hn::Store(hn::Max(a, b), d, high);
     }
-    std::memcpy(sorted, samples[c], count * kRun);
-    take_median(sorted, count, median[c]);
-    scatter(median[c], background[c]);
+    hn::Store(hn::AverageRound(hn::Load(d, samples[network.lower_middle()] + i),
+                               hn::Load(d, samples[network.upper_middle()] + i)),
+              d, median + i);
   }
-  for (size_t i = 0; i < count; ++i)
-    for (size_t x = 0; x < kRun; ++x) {
-      const int r = samples[0][i][x] - median[0][x], g = samples[1][i][x] - median[1][x],
-                b = samples[2][i][x] - median[2][x];
-      const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
-      sorted[i][x] = static_cast<uint8_t>(static_cast<int>(norm < 63.75f ? 4 * norm : 255.0f));
-    }
-  // One frame says nothing of a spread.
-  if (count > 1)
-    take_median(sorted, count, median[0]);
-  else
-    std::memset(median[0], 0, kRun);
-  scatter(median[0], spread);
+}
+
+// A plain loop, which the compiler makes vectors of.
+void scale_row(size_t count, float factor, uint8_t* samples) {
+  for (size_t i = 0; i < count; ++i) samples[i] = in_light(samples[i], factor);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -97,13 +54,76 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
-HWY_EXPORT(block);
+HWY_EXPORT(take_median);
+HWY_EXPORT(scale_row);
+
+constexpr size_t kRun = kMedianBlock, kUnit = 64, kMost = 16;
+static_assert(kMedianFrames <= kMost);
+using Network = MedianNetwork<kMost>;
+
+template <size_t... kCounts>
+constexpr std::array<Network, sizeof...(kCounts)> networks_of(std::index_sequence<kCounts...>) {
+  return {Network(kCounts)...};
+}
+// Of 0 .. kMedianFrames samples.
+constexpr auto kNetworks = networks_of(std::make_index_sequence<kMedianFrames + 1>());
+
+// Of a few samples: a call of memcpy would take longer.
+void copy_row(const uint8_t* from, size_t count, uint8_t* to) {
+  // Two halves that may overlap.
+  const auto copy = [&](auto size) {
+    std::memcpy(to, from, size);
+    std::memcpy(to + count - size, from + count - size, size);
+  };
+  using std::integral_constant;
+  if (count > 32)
+    std::memcpy(to, from, count);
+  else if (count >= 16)
+    copy(integral_constant<size_t, 16>());
+  else if (count >= 8)
+    copy(integral_constant<size_t, 8>());
+  else if (count >= 4)
+    copy(integral_constant<size_t, 4>());
+  else
+    for (size_t i = 0; i < count; ++i) to[i] = from[i];
+}
 
 }  // namespace
 
 void median_block(const uint8_t* const* rows, const float* inverse, size_t count, size_t width,
                   size_t height, size_t stride, uint8_t* const* background, uint8_t* spread) {
-  HWY_DYNAMIC_DISPATCH(block)(rows, inverse, count, width, height, stride, background, spread);
+  alignas(64) uint8_t samples[kChannels][kMost][kRun], sorted[kMost][kRun], median[kChannels][kRun];
+  const size_t used = width * height, padded = (used + kUnit - 1) / kUnit * kUnit;
+  const auto scatter = [&](const uint8_t* from, uint8_t* to) {
+    for (size_t y = 0; y < height; ++y) copy_row(from + y * width, width, to + y * stride);
+  };
+  const Network& network = kNetworks[count];
+  for (size_t c = 0; c < kChannels; ++c) {
+    for (size_t i = 0; i < count; ++i) {
+      const uint8_t* from = rows[kChannels * i + c];
+      uint8_t* to = samples[c][i];
+      for (size_t y = 0; y < height; ++y) {
+        // Cells that follow take mostly the same frames' next samples, too far apart for the
+        // hardware to foresee.
+        hwy::Prefetch(from + y * stride + kUnit);
+        copy_row(from + y * stride, width, to + y * width);
+      }
+      std::memset(to + used, 0, padded - used);
+      const float factor = inverse[kChannels * i + c];
+      if (factor != 1) HWY_DYNAMIC_DISPATCH(scale_row)(padded, factor, to);
+      for (size_t x = 0; x < padded; x += kUnit) std::memcpy(sorted[i] + x, to + x, kUnit);
+    }
+    HWY_DYNAMIC_DISPATCH(take_median)(network, padded, sorted, median[c]);
+    scatter(median[c], background[c]);
+  }
+  const uint8_t* const middle[3] = {median[0], median[1], median[2]};
+  for (size_t i = 0; i < count; ++i) {
+    const uint8_t* const x[3] = {samples[0][i], samples[1][i], samples[2][i]};
+    residual_norm(x, middle, padded, sorted[i], 4);
+  }
+  // One frame says nothing of a spread: its distance is 0.
+  HWY_DYNAMIC_DISPATCH(take_median)(network, padded, sorted, median[0]);
+  scatter(median[0], spread);
 }
 
 }  // namespace qdmd

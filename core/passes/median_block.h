@@ -7,7 +7,7 @@
 namespace qdmd {
 
 // Frames of a median, and pixels of a block, at most.
-constexpr int kMedianFrames = 31;
+constexpr int kMedianFrames = 15;
 constexpr int kMedianBlock = 128;
 
 // The block has `height` rows of `width` pixels, `stride` apart. rows[3 i + c] is the first sample

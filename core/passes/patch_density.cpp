@@ -1,7 +1,7 @@
 #include "core/passes/patch_density.h"
 
 #include <algorithm>
-#include <cmath>
+#include <vector>
 
 #include "core/passes/bands.h"
 
@@ -13,70 +13,106 @@ HWY_BEFORE_NAMESPACE();
 namespace qdmd {
 namespace HWY_NAMESPACE {
 
-// Plain loops, which the compiler makes vectors of for each instruction set.
+namespace hn = hwy::HWY_NAMESPACE;
 
-// Rows [first, end) of the density. scratch: (end - first + 2 kPatchRadius + 1) rows of
-// cols + 2 kPatchRadius.
-void density_band(const Grid& grid, const GridFrames& frames, int count, int first, int end,
-                  float* scratch, float* density) {
-  constexpr int kR = kPatchRadius;
-  const int cols = grid.cols, stride = cols + 2 * kR;
-  const int top = std::max(0, first - kR), bottom = std::min(grid.rows, end + kR);
-  // The column sums of one row of patches, with empty cells at both ends.
-  float* sums = scratch + static_cast<ptrdiff_t>(bottom - top) * cols;
-  std::fill_n(sums, stride, 0.0f);
-  for (int s = 0; s < count; ++s)
-    for (int t = s; t < count; ++t) {
-      const ptrdiff_t start = static_cast<ptrdiff_t>(top) * cols;
-      const float *ar = frames.plane(s, 0) + start, *ag = frames.plane(s, 1) + start,
-                  *ab = frames.plane(s, 2) + start;
-      const float *br = frames.plane(t, 0) + start, *bg = frames.plane(t, 1) + start,
-                  *bb = frames.plane(t, 2) + start;
-      const int inside = (bottom - top) * cols;
-      for (int i = 0; i < inside; ++i) {
-        const float sum =
-            std::abs(ar[i] - br[i]) + std::abs(ag[i] - bg[i]) + std::abs(ab[i] - bb[i]);
-        scratch[i] = std::min(sum, 3 * kMostDistance);
+// Vectors of at most 32 cells or frames.
+constexpr size_t kUnit = 32;
+using Steps = hn::CappedTag<uint16_t, kUnit>;
+
+constexpr size_t kR = kPatchRadius, kAlong = 2 * kR + 1;
+static_assert(kAlong == 5, "the sums of a patch are written out");
+// What a cell counts at most: a patch's sum has room in 16 bits.
+constexpr auto kMost = static_cast<uint16_t>(kChannels * kMostDistance * kStepsPerLevel);
+static_assert(kAlong * kAlong * kMost < 65536);
+
+// A row of patches' sums, with empty cells at both ends.
+constexpr size_t sums_stride(size_t cols) { return (cols + kUnit - 1) / kUnit * kUnit + 2 * kR; }
+
+template <class V>
+HWY_INLINE V cell_distance(V r, V g, V b, V other_r, V other_g, V other_b) {
+  const auto distance = [](V x, V y) HWY_ATTR { return hn::Sub(hn::Max(x, y), hn::Min(x, y)); };
+  const V sum = hn::SaturatedAdd(hn::SaturatedAdd(distance(r, other_r), distance(g, other_g)),
+                                 distance(b, other_b));
+  return hn::Min(sum, hn::Set(Steps(), kMost));
+}
+
+// A plain loop, which the compiler makes vectors of.
+void to_steps(const float* HWY_RESTRICT levels, size_t count, uint16_t* HWY_RESTRICT steps) {
+  for (size_t i = 0; i < count; ++i) steps[i] = steps_of(levels[i]);
+}
+
+HWY_INLINE void add_alike(const uint16_t* HWY_RESTRICT alike, size_t count,
+                          float* HWY_RESTRICT density) {
+  const hn::CappedTag<float, 16> d;
+  const hn::Rebind<int32_t, decltype(d)> d32;
+  const hn::Rebind<uint16_t, decltype(d)> d16;
+  size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
+    const auto more = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d16, alike + i)));
+    hn::StoreU(hn::Add(hn::LoadU(d, density + i), more), d, density + i);
+  }
+  for (; i < count; ++i) density[i] += static_cast<float>(alike[i]);
+}
+
+// Adds rows [first, end) of what frames s and t have in common, in steps, to one density and, if
+// there is one, another. of_s, of_t: rows * cols steps of each channel. limit: the steps at which
+// nothing is alike. Floats hold these sums exactly. sums: for each of end - first rows
+// sums_stride(cols), 0 at first.
+void add_pair(const uint16_t* of_s, const uint16_t* of_t, const uint16_t* limit, size_t rows,
+              size_t cols, size_t first, size_t end, uint16_t* sums, float* density,
+              float* another) {
+  const Steps d;
+  const size_t lanes = hn::Lanes(d), stride = sums_stride(cols), cells = rows * cols;
+  // Down the columns first, with the last rows in registers: what is read right after it was
+  // written beside would be waited for. Lanes beyond the row's end hold the next row's cells.
+  for (size_t x = 0; x < cols; x += lanes) {
+    auto d0 = hn::Zero(d), d1 = d0, d2 = d0, d3 = d0, d4 = d0;
+    for (size_t row = first > kR ? first - kR : 0; row < end + kR; ++row) {
+      d0 = d1, d1 = d2, d2 = d3, d3 = d4, d4 = hn::Zero(d);
+      if (row < rows) {
+        const uint16_t *a = of_s + row * cols + x, *b = of_t + row * cols + x;
+        d4 = cell_distance(hn::LoadU(d, a), hn::LoadU(d, a + cells), hn::LoadU(d, a + 2 * cells),
+                           hn::LoadU(d, b), hn::LoadU(d, b + cells), hn::LoadU(d, b + 2 * cells));
       }
-      for (int row = first; row < end; ++row) {
-        const int above = std::max(top, row - kR), below = std::min(bottom - 1, row + kR);
-        float* column = sums + kR;
-        const float* from = scratch + static_cast<ptrdiff_t>(above - top) * cols;
-        for (int x = 0; x < cols; ++x) column[x] = from[x];
-        for (int y = above + 1; y <= below; ++y) {
-          from += cols;
-          for (int x = 0; x < cols; ++x) column[x] += from[x];
-        }
-        const ptrdiff_t cell = static_cast<ptrdiff_t>(row) * cols;
-        float* of_s = density + static_cast<ptrdiff_t>(s) * grid.rows * cols + cell;
-        float* of_t = density + static_cast<ptrdiff_t>(t) * grid.rows * cols + cell;
-        const auto patch_rows = static_cast<float>(below - above + 1);
-        const float scale = 1 / (3 * kSimilar * patch_rows);
-        const auto add = [&](int x, float patch_cols) {
-          const float sum = sums[x] + sums[x + 1] + sums[x + 2] + sums[x + 3] + sums[x + 4];
-          const float alike = std::max(0.0f, 1 - sum * scale / patch_cols);
-          of_s[x] += alike;
-          if (s != t) of_t[x] += alike;
-        };
-        const auto columns_at = [&](int x) {
-          return static_cast<float>(std::min(cols - 1, x + kR) - std::max(0, x - kR) + 1);
-        };
-        const int left = std::min(kR, cols), right = std::max(left, cols - kR);
-        for (int x = 0; x < left; ++x) add(x, columns_at(x));
-        if (s != t) {
-          const float whole = scale / (2 * kR + 1);
-          for (int x = left; x < right; ++x) {
-            const float sum = sums[x] + sums[x + 1] + sums[x + 2] + sums[x + 3] + sums[x + 4];
-            const float alike = std::max(0.0f, 1 - sum * whole);
-            of_s[x] += alike;
-            of_t[x] += alike;
-          }
-        } else {
-          for (int x = left; x < right; ++x) of_s[x] += 1;
-        }
-        for (int x = right; x < cols; ++x) add(x, columns_at(x));
-      }
+      if (row < first + kR) continue;
+      hn::StoreU(hn::Add(hn::Add(hn::Add(d0, d1), hn::Add(d2, d3)), d4), d,
+                 sums + (row - kR - first) * stride + kR + x);
     }
+  }
+  for (size_t row = 0; row < end - first; ++row)
+    for (size_t i = 0; i < kR; ++i) sums[row * stride + kR + cols + i] = 0;
+  for (size_t row = first; row < end; ++row) {
+    const uint16_t* of_row = sums + (row - first) * stride;
+    HWY_ALIGN uint16_t alike[kUnit];
+    for (size_t x = 0; x < cols; x += lanes) {
+      const auto outer = hn::Add(hn::LoadU(d, of_row + x), hn::LoadU(d, of_row + x + 4));
+      const auto inner = hn::Add(hn::LoadU(d, of_row + x + 1), hn::LoadU(d, of_row + x + 3));
+      const auto patch = hn::Add(hn::Add(outer, inner), hn::LoadU(d, of_row + x + 2));
+      const size_t cell = row * cols + x, count = std::min(lanes, cols - x);
+      hn::Store(hn::SaturatedSub(hn::LoadU(d, limit + cell), patch), d, alike);
+      add_alike(alike, count, density + cell);
+      if (another) add_alike(alike, count, another + cell);
+    }
+  }
+}
+
+// The sums of the distances of one cell's patch, cells left to right of rows above to below, in all
+// frames from the frame `other`. steps: of each cell and channel `frames`, whole vectors.
+void add_patch(const uint16_t* steps, size_t cols, size_t frames, size_t above, size_t below,
+               size_t left, size_t right, size_t other, uint16_t* sums) {
+  const Steps d;
+  for (size_t t = 0; t < frames; t += hn::Lanes(d)) {
+    auto sum = hn::Zero(d);
+    for (size_t y = above; y <= below; ++y)
+      for (size_t x = left; x <= right; ++x) {
+        const uint16_t* r = steps + (y * cols + x) * kChannels * frames;
+        const uint16_t *g = r + frames, *b = g + frames;
+        sum = hn::Add(
+            sum, cell_distance(hn::LoadU(d, r + t), hn::LoadU(d, g + t), hn::LoadU(d, b + t),
+                               hn::Set(d, r[other]), hn::Set(d, g[other]), hn::Set(d, b[other])));
+      }
+    hn::StoreU(sum, d, sums + t);
+  }
 }
 
 }  // namespace HWY_NAMESPACE
@@ -87,52 +123,115 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
-HWY_EXPORT(density_band);
+HWY_EXPORT(to_steps);
+HWY_EXPORT(add_pair);
+HWY_EXPORT(add_patch);
 
-static_assert(kPatchRadius == 2, "the sum of a patch's columns is written out");
+// Whole vectors of every instruction set.
+constexpr size_t kVector = 32;
+// Rows of a band at most. What it has in common with its neighbours costs little.
+constexpr int kBandRows = 12;
+// Frames that are compared with all before while they are in the first cache.
+constexpr int kBlock = 8;
 
-// Bands of rows whose halo costs little.
-constexpr int kBandRows = 16;
-
-int band_count(const Grid& grid) { return (grid.rows + kBandRows - 1) / kBandRows; }
+size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector; }
 
 }  // namespace
 
-void patch_density(const Grid& grid, const GridFrames& frames, int count, Pool* pool,
-                   float* density) {
-  std::fill_n(density, grid.cells() * static_cast<size_t>(count), 0.0f);
-  const size_t scratch_size = static_cast<size_t>(kBandRows + 2 * kPatchRadius + 1) *
-                              static_cast<size_t>(grid.cols + 2 * kPatchRadius);
-  std::vector<float> scratch(scratch_size * pool->threads());
-  for_bands(*pool, grid.rows, band_count(grid), [&](int first, int rows, size_t worker) {
-    HWY_DYNAMIC_DISPATCH(density_band)
-    (grid, frames, count, first, first + rows, scratch.data() + worker * scratch_size, density);
+PatchFrames::PatchFrames(const Grid& grid, const GridFrames& frames, int count, Pool* pool)
+    : grid_(grid),
+      steps_(static_cast<size_t>(count) * kChannels * grid.cells() + kVector),
+      limit_(grid.cells() + kVector),
+      sums_(sums_size() * pool->threads()) {
+  pool->run(static_cast<size_t>(count), [&](size_t t) {
+    // The channels lie one after another in both.
+    HWY_DYNAMIC_DISPATCH(to_steps)
+    (frames.plane(static_cast<int>(t), 0), kChannels * grid_.cells(),
+     steps_.data() + t * kChannels * grid_.cells());
+  });
+  size_t cell = 0;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int col = 0; col < grid.cols; ++col, ++cell)
+      limit_[cell] = static_cast<uint16_t>(kChannels * kSimilar * kStepsPerLevel *
+                                           static_cast<float>(patch_cells(grid, row, col)));
+}
+
+uint64_t PatchFrames::bytes(const Grid& grid, uint64_t count) {
+  return sizeof(uint16_t) * grid.cells() * (count * kChannels + 1);
+}
+
+size_t PatchFrames::sums_size() const {
+  return kBandRows * (round_up(static_cast<size_t>(grid_.cols)) + 2 * kPatchRadius);
+}
+
+void PatchFrames::density(int count, Pool* pool, float* density) {
+  const size_t cells = grid_.cells(), cols = static_cast<size_t>(grid_.cols);
+  const int bands = std::min(grid_.rows, std::max((grid_.rows + kBandRows - 1) / kBandRows,
+                                                  static_cast<int>(pool->threads())));
+  const auto of = [&](int t) { return density + static_cast<size_t>(t) * cells; };
+  std::fill_n(density, cells * static_cast<size_t>(count), 0.0f);
+  for_bands(*pool, grid_.rows, bands, [&](int first_row, int row_count, size_t worker) {
+    const auto first = static_cast<size_t>(first_row), end = first + static_cast<size_t>(row_count);
+    uint16_t* sums = sums_.data() + worker * sums_size();
+    for (int block = 0; block < count; block += kBlock) {
+      const int last = std::min(count, block + kBlock);
+      for (int s = 0; s < last; ++s)
+        for (int t = std::max(s, block); t < last; ++t) HWY_DYNAMIC_DISPATCH(add_pair)
+      (steps(s), steps(t), limit_.data(), static_cast<size_t>(grid_.rows), cols, first, end, sums,
+       of(s), s == t ? nullptr : of(t));
+    }
+    for (int t = 0; t < count; ++t)
+      for (size_t cell = first * cols; cell < end * cols; ++cell)
+        of(t)[cell] /= static_cast<float>(limit_[cell]);
   });
 }
 
+void PatchFrames::alike(int s, int t, float* alike) {
+  const auto rows = static_cast<size_t>(grid_.rows);
+  std::fill_n(alike, grid_.cells(), 0.0f);
+  for (size_t first = 0; first < rows; first += kBandRows) HWY_DYNAMIC_DISPATCH(add_pair)
+  (steps(s), steps(t), limit_.data(), rows, static_cast<size_t>(grid_.cols), first,
+   std::min(rows, first + kBandRows), sums_.data(), alike, nullptr);
+  for (size_t cell = 0; cell < grid_.cells(); ++cell)
+    alike[cell] /= static_cast<float>(limit_[cell]);
+}
+
+uint64_t patch_distance_bytes(const Grid& grid, uint64_t count) {
+  return sizeof(uint16_t) * grid.cells() * (kChannels * round_up(count) + count);
+}
+
 void patch_distance(const Grid& grid, const GridFrames& frames, int count, const int* reference,
-                    Pool* pool, float* distance) {
-  for_bands(*pool, grid.rows, band_count(grid), [&](int first, int rows, size_t) {
-    for (int t = 0; t < count; ++t)
-      for (int y = first; y < first + rows; ++y)
-        for (int x = 0; x < grid.cols; ++x) {
-          const int cell = y * grid.cols + x, other = reference[cell];
-          const int above = std::max(0, y - kPatchRadius),
-                    below = std::min(grid.rows - 1, y + kPatchRadius);
-          const int left = std::max(0, x - kPatchRadius),
-                    right = std::min(grid.cols - 1, x + kPatchRadius);
-          float sum = 0;
-          for (int yy = above; yy <= below; ++yy)
-            for (int xx = left; xx <= right; ++xx) {
-              const int i = yy * grid.cols + xx;
-              float d = 0;
-              for (int c = 0; c < kChannels; ++c)
-                d += std::abs(frames.plane(t, c)[i] - frames.plane(other, c)[i]);
-              sum += std::min(d, 3 * kMostDistance);
-            }
-          const auto cells = static_cast<float>(3 * (below - above + 1) * (right - left + 1));
-          distance[static_cast<size_t>(t) * grid.cells() + static_cast<size_t>(cell)] = sum / cells;
-        }
+                    Pool* pool, uint16_t* distance) {
+  const auto rows = static_cast<size_t>(grid.rows), cols = static_cast<size_t>(grid.cols);
+  const int known = std::max(count, *std::max_element(reference, reference + grid.cells()) + 1);
+  const auto all = static_cast<size_t>(count), stride = round_up(static_cast<size_t>(known));
+  // Of each cell and channel all frames side by side.
+  std::vector<uint16_t> steps(grid.cells() * kChannels * stride), sums(stride * pool->threads());
+  // Some cells of all frames at a time: their frames are too far apart for the caches to keep the
+  // others.
+  constexpr size_t kTogether = 16;
+  pool->run((grid.cells() + kTogether - 1) / kTogether, [&](size_t part) {
+    const size_t first = part * kTogether, size = std::min(kTogether, grid.cells() - first);
+    for (size_t c = 0; c < kChannels; ++c)
+      for (int t = 0; t < known; ++t) {
+        uint16_t of_frame[kTogether];
+        HWY_DYNAMIC_DISPATCH(to_steps)
+        (frames.plane(t, static_cast<int>(c)) + first, size, of_frame);
+        uint16_t* to = steps.data() + (first * kChannels + c) * stride + static_cast<size_t>(t);
+        for (size_t i = 0; i < size; ++i) to[i * kChannels * stride] = of_frame[i];
+      }
+  });
+  pool->run(rows, [&](size_t row, size_t worker) {
+    uint16_t* sum = sums.data() + worker * stride;
+    constexpr size_t kReach = kPatchRadius;
+    for (size_t col = 0; col < cols; ++col) {
+      const size_t cell = row * cols + col;
+      HWY_DYNAMIC_DISPATCH(add_patch)
+      (steps.data(), cols, stride, row - std::min(row, kReach), std::min(rows - 1, row + kReach),
+       col - std::min(col, kReach), std::min(cols - 1, col + kReach),
+       static_cast<size_t>(reference[cell]), sum);
+      std::copy_n(sum, all, distance + cell * all);
+    }
   });
 }
 

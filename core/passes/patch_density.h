@@ -1,6 +1,8 @@
 // How alike the patches around a cell are in different frames.
 #pragma once
 
+#include <vector>
+
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
@@ -11,15 +13,54 @@ constexpr float kSimilar =
     5;  // levels a channel: the distance at which patches are no longer alike
 constexpr float kMostDistance = 40;  // levels a channel: a cell counts at most this
 
-// density[t * cells + cell] = sum over frames s of max(0, 1 - d(s, t) / kSimilar), where d is the
-// mean absolute difference of the patches around the cell. Costs count^2 / 2 times some 30
-// operations a cell.
-void patch_density(const Grid& grid, const GridFrames& frames, int count, Pool* pool,
-                   float* density);
+// Cells are compared in integers, of 16 steps a level and up to 4095 levels: what they add up to
+// does not depend on the order, so that sums may slide and machines do not differ.
+constexpr int kStepsPerLevel = 16;
+[[gnu::always_inline]] inline uint16_t steps_of(float level) {
+  const float steps = level * kStepsPerLevel + 0.5f;
+  return static_cast<uint16_t>(static_cast<int>(steps < 65535.0f ? steps : 65535.0f));
+}
+// The cells of the patch around a cell; at the border they are fewer.
+inline int patch_cells(const Grid& grid, int row, int col) {
+  const auto along = [](int at, int length) {
+    return (at + kPatchRadius < length ? at + kPatchRadius : length - 1) -
+           (at > kPatchRadius ? at - kPatchRadius : 0) + 1;
+  };
+  return along(row, grid.rows) * along(col, grid.cols);
+}
 
-// distance[t * cells + cell]: d of the patch around the cell in frame t and in frame
-// reference[cell].
+// The cells of `count` frames, to be compared with each other. With d(s, t) the mean absolute
+// difference of the patches around a cell in frames s and t, they are alike by
+// max(0, 1 - d(s, t) / kSimilar).
+class PatchFrames {
+ public:
+  PatchFrames(const Grid& grid, const GridFrames& frames, int count, Pool* pool);
+  static uint64_t bytes(const Grid& grid, uint64_t count);
+
+  // density[t * cells + cell] = the sum over frames s < count of how alike s and t are.
+  void density(int count, Pool* pool, float* density);
+  // alike[cell]: how alike s and t are.
+  void alike(int s, int t, float* alike);
+
+ private:
+  const uint16_t* steps(int frame) const {
+    return steps_.data() + static_cast<size_t>(frame) * kChannels * grid_.cells();
+  }
+  size_t sums_size() const;
+
+  Grid grid_;
+  // Readable up to whole vectors behind the last cell. limit_: of each cell, the patch's steps at
+  // which nothing is alike.
+  std::vector<uint16_t> steps_, limit_;
+  std::vector<uint16_t> sums_;  // for each thread
+};
+
+// distance[cell * count + t]: the steps that the patches around the cell in frame t and in frame
+// reference[cell] differ by, all channels together: d times kChannels * kStepsPerLevel *
+// patch_cells().
 void patch_distance(const Grid& grid, const GridFrames& frames, int count, const int* reference,
-                    Pool* pool, float* distance);
+                    Pool* pool, uint16_t* distance);
+// The memory that it takes, with the result.
+uint64_t patch_distance_bytes(const Grid& grid, uint64_t count);
 
 }  // namespace qdmd

@@ -62,16 +62,34 @@ size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, ui
                 : exceed_limits<false>(x, l, count, limit, nullptr, out);
 }
 
-// A plain loop, which the compiler makes vectors of for each instruction set.
-void norm_row(const uint8_t* HWY_RESTRICT xr, const uint8_t* HWY_RESTRICT xg,
-              const uint8_t* HWY_RESTRICT xb, const uint8_t* HWY_RESTRICT lr,
-              const uint8_t* HWY_RESTRICT lg, const uint8_t* HWY_RESTRICT lb, size_t count,
-              uint8_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i) {
-    const int r = xr[i] - lr[i], g = xg[i] - lg[i], b = xb[i] - lb[i];
-    const float norm = std::sqrt(static_cast<float>(r * r + g * g + b * b));
-    out[i] = static_cast<uint8_t>(static_cast<int>(norm < 255.0f ? norm : 255.0f));
+// Not a plain loop: compilers make no vectors of std::sqrt, which may set errno. Roots are rounded
+// correctly on every instruction set, and none of an integer up to 65535 is rounded up to the next.
+size_t norm(const uint8_t* const* x, const uint8_t* const* l, size_t count, float steps,
+            uint8_t* out) {
+  const hn::ScalableTag<float> d;
+  const hn::Rebind<int32_t, decltype(d)> d32;
+  const hn::Rebind<uint16_t, decltype(d)> d16;
+  const hn::Rebind<uint8_t, decltype(d)> d8;
+  const hn::RebindToUnsigned<decltype(d32)> d32u;
+  const auto factor = hn::Set(d, steps), most = hn::Set(d, 255.0f);
+  // Known not to change with what is written.
+  const uint8_t *xr = x[0], *xg = x[1], *xb = x[2], *lr = l[0], *lg = l[1], *lb = l[2];
+  const auto square = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
+    const auto a = hn::LoadU(d8, of_x), b = hn::LoadU(d8, of_l);
+    const auto distance =
+        hn::PromoteTo(d16, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
+    return hn::Mul(distance, distance);
+  };
+  size_t p = 0;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    // Saturated sums have a norm of 255 like all above.
+    const auto sum = hn::SaturatedAdd(
+        hn::SaturatedAdd(square(xr + p, lr + p), square(xg + p, lg + p)), square(xb + p, lb + p));
+    const auto level = hn::Mul(factor, hn::Sqrt(hn::ConvertTo(d, hn::PromoteTo(d32, sum))));
+    const auto whole = hn::ConvertTo(d32, hn::Min(level, most));
+    hn::StoreU(hn::TruncateTo(d8, hn::BitCast(d32u, whole)), d8, out + p);
   }
+  return p;
 }
 
 size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
@@ -93,7 +111,7 @@ namespace {
 HWY_EXPORT(differ);
 HWY_EXPORT(exceed);
 HWY_EXPORT(mask_samples);
-HWY_EXPORT(norm_row);
+HWY_EXPORT(norm);
 
 }  // namespace
 
@@ -102,9 +120,15 @@ void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t
     out[p] = static_cast<uint8_t>(std::abs(x[p] - l[p]));
 }
 
-void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
-                   uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(norm_row)(x[0], x[1], x[2], l[0], l[1], l[2], count, out);
+void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count, uint8_t* out,
+                   int steps) {
+  const auto factor = static_cast<float>(steps);
+  for (size_t p = HWY_DYNAMIC_DISPATCH(norm)(x, l, count, factor, out); p < count; ++p) {
+    int sum = 0;
+    for (int c = 0; c < 3; ++c) sum += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+    const float level = factor * std::sqrt(static_cast<float>(sum));
+    out[p] = static_cast<uint8_t>(static_cast<int>(std::min(level, 255.0f)));
+  }
 }
 
 void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,

@@ -9,9 +9,10 @@ namespace qdmd {
 // out[p] = |x[p] - l[p]|.
 void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out);
 
-// out[p] = the quaternion norm of x[p] - l[p], rounded down, at most 255. x, l: R, G, B.
-void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
-                   uint8_t* out);
+// out[p] = the quaternion norm of x[p] - l[p] in 1/steps level, rounded down, at most 255. x, l: R,
+// G, B; steps: 1, or another power of two.
+void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count, uint8_t* out,
+                   int steps = 1);
 
 // out[p] = 255 where the quaternion norm of x - l exceeds `threshold` (grey levels, >= 0; a norm is
 // at most 255 sqrt(3)) and the pixel's own limit, else 0. x, l: R, G, B. limits: or null, for none.

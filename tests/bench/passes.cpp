@@ -101,10 +101,7 @@ struct Scene {
   uint8_t* level(int c) { return levels.data() + static_cast<size_t>(c) * size.pixels(); }
   uint8_t* packed_in() { return in[turn % kPool].data(); }
   uint8_t* packed_out() { return out[turn % kPool].data(); }
-  void decide(Shadows shadows) {
-    decision.set_shadows(shadows);
-    decision.decide({{plane(0), plane(1), plane(2)}, &clean, 18}, nullptr);
-  }
+  void decide() { decision.decide({{plane(0), plane(1), plane(2)}, &clean, 18}, nullptr); }
   void next() { turn = (turn + 1) % size.window; }
 
   void split() {
@@ -230,7 +227,7 @@ void add_output(const char* name, Output output, const Size& size) {
                              nullptr,
                              nullptr,
                              255};
-    if (output == Output::mask || output == Output::cutout) scene.decide(Shadows::background);
+    if (output == Output::mask || output == Output::cutout) scene.decide();
     write_output(task, view_of(scene.size, scene.packed_out()), 0, scene.size.height);
   });
 }
@@ -342,12 +339,6 @@ void add_all(const Size& size) {
                         static_cast<int>(first));
         }
       });
-  // A frame with boxes on a tenth of its pixels.
-  for (auto [name, shadows] : {std::pair{"decide", Shadows::background},
-                               {"decide_shadows_foreground", Shadows::foreground}})
-    add(
-        name, size, [](Scene&) { return Traffic(); },
-        [shadows](Scene& scene) { scene.decide(shadows); });
   add_output("write_background", Output::background, size);
   add_output("write_foreground", Output::foreground, size);
   add_output("write_mask", Output::mask, size);

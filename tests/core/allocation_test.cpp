@@ -52,7 +52,12 @@ struct Steady {
 
   Steady(const EngineOptions& options, Alpha alpha, std::mt19937& rng)
       : out(kWidth, kHeight, alpha == Alpha::none ? 3 : 4, alpha != Alpha::none) {
-    EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+    EngineOptions soft = options;
+    soft.mask_softness = 2;
+    EXPECT_TRUE(engine.configure(soft, kWidth, kHeight).ok());
+    IgnoredAreas areas;
+    areas.add({10, 10, 50, 50});
+    engine.set_ignored(areas);
     for (int k = 0; k < 7; ++k) {
       frames.emplace_back(kWidth, kHeight, out.bytes_per_pixel, out.with_alpha);
       for (uint8_t& byte : frames.back().bytes) byte = static_cast<uint8_t>(rng() >> 9);

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/passes/combine.h"
+#include "core/passes/median_network.h"
+#include "core/passes/median_rows.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
 #include "tests/core/constants.h"
@@ -22,6 +24,65 @@ constexpr uint8_t kCanary = 0x5A;
 constexpr int kWidths[] = {1, 3, 15, 16, 17, 33, 63, 64, 65, 255};
 
 uint8_t random_byte(std::mt19937& rng) { return static_cast<uint8_t>(rng() >> 13); }
+
+// ---- Medians ----
+
+template <size_t kMost>
+void expect_middle(std::vector<int> samples) {
+  const MedianNetwork<kMost> network(samples.size());
+  std::vector<int> sorted = samples;
+  std::sort(sorted.begin(), sorted.end());
+  for (const auto& [smaller, larger] : network)
+    if (samples[larger] < samples[smaller]) std::swap(samples[larger], samples[smaller]);
+  ASSERT_EQ(samples[network.lower_middle()], sorted[(sorted.size() - 1) / 2]) << sorted.size();
+  ASSERT_EQ(samples[network.upper_middle()], sorted[sorted.size() / 2]) << sorted.size();
+}
+
+// What is right for all sequences of zeros and ones is for all others (Knuth, vol. 3, 5.3.4).
+TEST(MedianNetwork, PutsTheMiddleOfAnySamplesInPlace) {
+  for (size_t count = 1; count <= 16; ++count)
+    for (unsigned ones = 0; ones < 1u << count; ++ones) {
+      std::vector<int> samples(count);
+      for (size_t i = 0; i < count; ++i) samples[i] = static_cast<int>(ones >> i & 1);
+      expect_middle<16>(samples);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+  std::mt19937 rng(209);
+  for (size_t count = 1; count <= 64; ++count)
+    for (int turn = 0; turn < 200; ++turn) {
+      std::vector<int> samples(count);
+      for (int& sample : samples) sample = static_cast<int>(rng() % (turn % 2 ? 2 : 1000));
+      expect_middle<64>(samples);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+}
+
+TEST(MedianRows, IsTheMiddleOfEveryNumberOfRows) {
+  std::mt19937 rng(210);
+  std::uniform_real_distribution<float> level(0, 255);
+  on_every_target([&] {
+    for (size_t count = 1; count <= kMedianRows; ++count) {
+      const size_t width = 1 + rng() % 40;
+      std::vector<std::unique_ptr<BeforeTheEdge<float>>> rows;
+      std::vector<const float*> pointers;
+      std::vector<float> divisors;
+      for (size_t i = 0; i < count; ++i) {
+        rows.push_back(std::make_unique<BeforeTheEdge<float>>(width));
+        for (float& sample : *rows.back()) sample = level(rng);
+        pointers.push_back(rows.back()->data());
+        divisors.push_back(i % 3 ? 1 : 0.5f + level(rng) / 255);
+      }
+      BeforeTheEdge<float> median(width);
+      median_rows(pointers.data(), divisors.data(), count, width, median.data());
+      for (size_t x = 0; x < width; ++x) {
+        std::vector<float> sorted;
+        for (size_t i = 0; i < count; ++i) sorted.push_back(pointers[i][x] / divisors[i]);
+        std::sort(sorted.begin(), sorted.end());
+        ASSERT_EQ(median[x], sorted[count / 2]) << count;
+      }
+    }
+  });
+}
 
 // ---- Packed pixels ----
 
@@ -265,6 +326,60 @@ TEST(AbsoluteResidual, OfAnyCount) {
       for (uint8_t& sample : l) sample = random_byte(rng);
       absolute_residual(x.data(), l.data(), count, out.data());
       for (size_t p = 0; p < count; ++p) ASSERT_EQ(out[p], std::abs(x[p] - l[p]));
+    }
+  });
+}
+
+// The largest integer whose square is at most `square`, at most 255.
+int whole_root(int square) {
+  const int root = static_cast<int>(std::lround(std::sqrt(square)));
+  return std::min(255, root * root > square ? root - 1 : root);
+}
+
+TEST(ResidualNorm, OfEveryNorm) {
+  on_every_target([] {
+    BeforeTheEdge<uint8_t> red(256), green(256), blue(256), white(256), norm(256), quarters(256);
+    std::fill(white.begin(), white.end(), static_cast<uint8_t>(255));
+    for (size_t p = 0; p < 256; ++p) blue[p] = static_cast<uint8_t>(p);
+    const uint8_t* const x[3] = {white.data(), green.data(), blue.data()};
+    BeforeTheEdge<uint8_t> zero(256);
+    std::fill(zero.begin(), zero.end(), static_cast<uint8_t>(0));
+    const uint8_t* const l[3] = {red.data(), white.data(), zero.data()};
+    for (int r = 0; r < 256; r += r < 72 ? 1 : 3) {
+      std::fill(red.begin(), red.end(), static_cast<uint8_t>(255 - r));
+      for (int g = 0; g <= r; ++g) {
+        std::fill(green.begin(), green.end(), static_cast<uint8_t>(255 - g));
+        residual_norm(x, l, 256, norm.data());
+        residual_norm(x, l, 256, quarters.data(), 4);
+        for (int b = 0; b < 256; ++b) {
+          const int square = r * r + g * g + b * b;
+          if (norm[static_cast<size_t>(b)] != whole_root(square) ||
+              quarters[static_cast<size_t>(b)] != whole_root(16 * square))
+            FAIL() << square;
+        }
+      }
+    }
+  });
+}
+
+TEST(ResidualNorm, OfAnyCount) {
+  std::mt19937 rng(208);
+  on_every_target([&] {
+    for (size_t count : kCounts) {
+      std::array<std::unique_ptr<BeforeTheEdge<uint8_t>>, 6> planes;
+      for (auto& plane : planes) {
+        plane = std::make_unique<BeforeTheEdge<uint8_t>>(count);
+        for (uint8_t& sample : *plane) sample = random_byte(rng);
+      }
+      BeforeTheEdge<uint8_t> norm(count);
+      const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
+      const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
+      residual_norm(x, l, count, norm.data());
+      for (size_t p = 0; p < count; ++p) {
+        int square = 0;
+        for (size_t c = 0; c < 3; ++c) square += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+        ASSERT_EQ(norm[p], whole_root(square));
+      }
     }
   });
 }

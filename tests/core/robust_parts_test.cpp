@@ -10,8 +10,6 @@
 namespace qdmd::test {
 namespace {
 
-constexpr double kFloatEpsilon = std::numeric_limits<float>::epsilon();
-
 struct Size {
   int rows, cols;
 };
@@ -42,22 +40,24 @@ GridFrames related_frames(const Grid& grid, int count, std::mt19937& rng) {
   return frames;
 }
 
-// d of the patches around (y, x), in double.
-double naive_distance(const Grid& grid, const GridFrames& frames, int s, int t, int y, int x) {
-  double sum = 0;
-  int cells = 0;
-  for (int yy = y - kPatchRadius; yy <= y + kPatchRadius; ++yy)
-    for (int xx = x - kPatchRadius; xx <= x + kPatchRadius; ++xx) {
-      if (yy < 0 || yy >= grid.rows || xx < 0 || xx >= grid.cols) continue;
-      const auto i = static_cast<size_t>(yy * grid.cols + xx);
-      double d = 0;
-      for (int c = 0; c < kChannels; ++c)
-        d += std::abs(double{frames.plane(s, c)[i]} - double{frames.plane(t, c)[i]});
-      sum += std::min(d / 3, double{kMostDistance});
-      ++cells;
-    }
-  return sum / cells;
-}
+// The sum of what the cells of the patches around (y, x) differ in, in steps of all channels.
+struct PatchSum {
+  int sum = 0, cells = 0;
+
+  PatchSum(const Grid& grid, const GridFrames& frames, int s, int t, int y, int x) {
+    for (int yy = y - kPatchRadius; yy <= y + kPatchRadius; ++yy)
+      for (int xx = x - kPatchRadius; xx <= x + kPatchRadius; ++xx) {
+        if (yy < 0 || yy >= grid.rows || xx < 0 || xx >= grid.cols) continue;
+        const auto i = static_cast<size_t>(yy * grid.cols + xx);
+        int d = 0;
+        for (int c = 0; c < kChannels; ++c)
+          d += std::abs(steps_of(frames.plane(s, c)[i]) - steps_of(frames.plane(t, c)[i]));
+        sum += std::min(d, static_cast<int>(3 * kMostDistance * kStepsPerLevel));
+        ++cells;
+      }
+  }
+  int similar() const { return static_cast<int>(3 * kSimilar * kStepsPerLevel) * cells; }
+};
 
 // ---- Cells ----
 
@@ -85,27 +85,43 @@ TEST(Cells, AreFewInThinPictures) {
 }
 
 TEST(Cells, MeansAreThoseOfTheirPixels) {
-  std::mt19937 rng(5);
-  for (const auto& [width, height] : {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}}) {
-    const Grid grid(width, height);
-    const auto plane = random_picture(static_cast<size_t>(width * height), rng);
-    std::vector<float> means(grid.cells(), -1);
-    cell_means(grid, plane.data(), means.data());
-    for (int row = 0; row < grid.rows; ++row)
-      for (int col = 0; col < grid.cols; ++col) {
-        double sum = 0;
-        int count = 0;
-        for (int y = grid.top(row); y < grid.top(row + 1); ++y)
-          for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
-            sum += plane[static_cast<size_t>(y * width + x)];
-        // A sum of integers: exact.
-        ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
-                  static_cast<float>(sum / count));
-      }
-  }
+  // Thin pictures have cells of more rows than 16 bits can sum, and more columns than are summed
+  // together.
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}, {3, 200000}, {200000, 3}})
+    on_every_target([&, width = width, height = height] {
+      std::mt19937 rng(5);
+      const Grid grid(width, height);
+      const auto pixels = static_cast<size_t>(width * height);
+      BeforeTheEdge<uint8_t> plane(pixels);
+      for (uint8_t& sample : plane)
+        sample = static_cast<uint8_t>(height > 90 ? 255 - rng() % 9 : rng());
+      std::vector<float> means(grid.cells(), -1);
+      cell_means(grid, plane.data(), means.data());
+      for (int row = 0; row < grid.rows; ++row)
+        for (int col = 0; col < grid.cols; ++col) {
+          double sum = 0;
+          int count = 0;
+          for (int y = grid.top(row); y < grid.top(row + 1); ++y)
+            for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
+              sum += plane[static_cast<size_t>(y * width + x)];
+          // A sum of integers: exact.
+          ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
+                    static_cast<float>(sum / count));
+        }
+    });
 }
 
 // ---- Patches ----
+
+TEST(Patches, LevelsHaveSixteenSteps) {
+  for (int step = 0; step < 65536; ++step) {
+    const float level = static_cast<float>(step) / kStepsPerLevel;
+    ASSERT_EQ(steps_of(level), step);
+    ASSERT_EQ(steps_of(level + 0.03f), step);
+  }
+  EXPECT_EQ(steps_of(255 / 0.01f), 65535);
+}
 
 TEST(Patches, DensityIsThatOfTheDoubleLoop) {
   std::mt19937 rng(6);
@@ -113,50 +129,89 @@ TEST(Patches, DensityIsThatOfTheDoubleLoop) {
   for (const auto& [rows, cols] : kGrids) {
     SCOPED_TRACE(testing::Message() << rows << " x " << cols);
     const Grid grid = grid_of(rows, cols);
-    for (int count : {1, 2, 3, 13}) {
+    for (int count : {1, 2, 3, 13, 17}) {
       const GridFrames frames = related_frames(grid, count, rng);
-      std::vector<double> expected(grid.cells() * static_cast<size_t>(count), 0);
+      std::vector<float> expected(grid.cells() * static_cast<size_t>(count));
       for (int t = 0; t < count; ++t)
-        for (int s = 0; s < count; ++s)
-          for (int y = 0; y < rows; ++y)
-            for (int x = 0; x < cols; ++x)
-              expected[static_cast<size_t>((t * rows + y) * cols + x)] +=
-                  std::max(0.0, 1 - naive_distance(grid, frames, s, t, y, x) / kSimilar);
+        for (int y = 0; y < rows; ++y)
+          for (int x = 0; x < cols; ++x) {
+            int64_t alike = 0;
+            for (int s = 0; s < count; ++s) {
+              const PatchSum patch(grid, frames, s, t, y, x);
+              alike += std::max(0, patch.similar() - patch.sum);
+            }
+            expected[static_cast<size_t>((t * rows + y) * cols + x)] =
+                static_cast<float>(alike) /
+                static_cast<float>(PatchSum(grid, frames, t, t, y, x).similar());
+          }
       on_every_target([&] {
-        std::vector<float> density(expected.size(), -1);
-        patch_density(grid, frames, count, &pool, density.data());
-        // 75 differences of levels up to 255 each, of which alike ones are at most kSimilar; then
-        // `count` sums of at most 1.
-        const double bound = (255.0 / double{kSimilar} + 75 + count) * kFloatEpsilon * count;
-        for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(density[i], expected[i], bound);
+        BeforeTheEdge<float> density(expected.size());
+        std::fill(density.begin(), density.end(), -1.0f);
+        PatchFrames(grid, frames, count, &pool).density(count, &pool, density.data());
+        // Sums of integers: exact.
+        ASSERT_TRUE(std::equal(density.begin(), density.end(), expected.begin()));
+        // Two frames by themselves.
+        std::vector<float> alike(grid.cells());
+        PatchFrames patches(grid, frames, count, &pool);
+        patches.alike(0, count - 1, alike.data());
+        for (int y = 0; y < rows; ++y)
+          for (int x = 0; x < cols; ++x) {
+            const PatchSum patch(grid, frames, 0, count - 1, y, x);
+            ASSERT_EQ(alike[static_cast<size_t>(y * cols + x)],
+                      static_cast<float>(std::max(0, patch.similar() - patch.sum)) /
+                          static_cast<float>(patch.similar()));
+          }
       });
     }
   }
 }
 
+// Levels beyond all that a camera has: a frame divided by a small gain.
+TEST(Patches, SumsHaveRoomForAnyLevels) {
+  Pool pool(1);
+  const Grid grid = grid_of(9, 40);
+  GridFrames frames(grid, 2);
+  std::fill_n(frames.plane(1, 0), kChannels * grid.cells(), 25500.0f);
+  const std::vector<int> reference(grid.cells(), 0);
+  on_every_target([&] {
+    std::vector<float> density(2 * grid.cells());
+    std::vector<uint16_t> distance(2 * grid.cells());
+    PatchFrames(grid, frames, 2, &pool).density(2, &pool, density.data());
+    for (float d : density) ASSERT_EQ(d, 1);
+    patch_distance(grid, frames, 2, reference.data(), &pool, distance.data());
+    for (size_t cell = 0; cell < grid.cells(); ++cell) {
+      ASSERT_EQ(distance[2 * cell], 0);
+      ASSERT_EQ(distance[2 * cell + 1],
+                kMostDistance * kChannels * kStepsPerLevel *
+                    static_cast<float>(patch_cells(grid, static_cast<int>(cell) / grid.cols,
+                                                   static_cast<int>(cell) % grid.cols)));
+    }
+  });
+}
+
 TEST(Patches, DistanceIsThatOfTheDoubleLoop) {
   std::mt19937 rng(7);
   Pool pool(2);
-  constexpr int kCount = 9;
-  for (const auto& [rows, cols] : kGrids) {
-    SCOPED_TRACE(testing::Message() << rows << " x " << cols);
-    const Grid grid = grid_of(rows, cols);
-    const GridFrames frames = related_frames(grid, kCount, rng);
-    std::vector<int> reference(grid.cells());
-    for (int& t : reference) t = static_cast<int>(rng() % kCount);
-    std::vector<float> distance(grid.cells() * kCount, -1);
-    patch_distance(grid, frames, kCount, reference.data(), &pool, distance.data());
-    for (int t = 0; t < kCount; ++t)
-      for (int cell = 0; cell < rows * cols; ++cell) {
-        const int other = reference[static_cast<size_t>(cell)];
-        const double expected = naive_distance(grid, frames, t, other, cell / cols, cell % cols);
-        ASSERT_NEAR(distance[static_cast<size_t>(t * rows * cols + cell)], expected,
-                    100 * kFloatEpsilon * kMostDistance);
-        if (t == other) {
-          ASSERT_EQ(distance[static_cast<size_t>(t * rows * cols + cell)], 0);
-        }
-      }
-  }
+  // Distances of all frames, and of all but one, from any of them; more than a vector has.
+  for (const auto& [count, known] : {std::pair{9, 9}, {33, 34}})
+    for (const auto& [rows, cols] : kGrids) {
+      SCOPED_TRACE(testing::Message() << rows << " x " << cols);
+      const Grid grid = grid_of(rows, cols);
+      const GridFrames frames = related_frames(grid, known, rng);
+      std::vector<int> reference(grid.cells());
+      for (int& t : reference) t = static_cast<int>(rng() % static_cast<unsigned>(known));
+      on_every_target([&] {
+        BeforeTheEdge<uint16_t> distance(grid.cells() * static_cast<size_t>(count));
+        patch_distance(grid, frames, count, reference.data(), &pool, distance.data());
+        for (int cell = 0; cell < rows * cols; ++cell)
+          for (int t = 0; t < count; ++t) {
+            const int other = reference[static_cast<size_t>(cell)];
+            const PatchSum patch(grid, frames, t, other, cell / cols, cell % cols);
+            ASSERT_EQ(distance[static_cast<size_t>(cell * count + t)], patch.sum);
+            ASSERT_EQ(patch_cells(grid, cell / cols, cell % cols), patch.cells);
+          }
+      });
+    }
 }
 
 TEST(Patches, AnyNumberOfThreadsGivesTheSameBits) {
@@ -168,10 +223,11 @@ TEST(Patches, AnyNumberOfThreadsGivesTheSameBits) {
   for (int& t : reference) t = static_cast<int>(rng() % kCount);
   const size_t size = grid.cells() * kCount;
   on_every_target([&] {
-    std::vector<float> density(size), distance(size), first_density, first_distance;
+    std::vector<float> density(size), first_density;
+    std::vector<uint16_t> distance(size), first_distance;
     for (int threads : {1, 2, 3, 8}) {
       Pool pool(threads);
-      patch_density(grid, frames, kCount, &pool, density.data());
+      PatchFrames(grid, frames, kCount, &pool).density(kCount, &pool, density.data());
       patch_distance(grid, frames, kCount, reference.data(), &pool, distance.data());
       if (threads == 1) first_density = density, first_distance = distance;
       ASSERT_EQ(density, first_density) << threads;

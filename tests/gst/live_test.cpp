@@ -440,12 +440,12 @@ TEST(LiveLimits, TooLittleMemoryNamesTheBytes) {
   EXPECT_EQ(GST_RESOURCE_ERROR_NO_SPACE_LEFT, message.code);
   for (const char* word : {"window-size", "200", "4096x2160", "1000000000", "max-memory"})
     EXPECT_NE(std::string::npos, message.text.find(word)) << word << " in " << message.text;
-  // The window's frames, and those that arrive during a solve.
+  // The window's frames, those that are remembered, and those that arrive during a solve.
   const size_t at = message.text.find("needs ");
   ASSERT_NE(std::string::npos, at) << message.text;
   const double bytes = std::stod(message.text.substr(at + 6)), window = 200.0 * 3 * 4096 * 2160;
   EXPECT_GE(bytes, window);
-  EXPECT_LE(bytes, 1.3 * window);
+  EXPECT_LE(bytes, 1.7 * window);
 }
 
 // ---- In time ----

@@ -13,7 +13,7 @@ from gi.repository import GObject, Gst
 ELEMENTS = ['qdmdbackground', 'qdmdscenesrc']
 PLAIN_NAMES = {'gboolean': 'boolean', 'guint': 'uint', 'gint': 'int', 'guint64': 'uint64',
                'gdouble': 'double', 'gchararray': 'string', 'GstStructure': 'structure',
-               'GstSample': 'sample'}
+               'GstSample': 'sample', 'GstValueArray': 'array'}
 # Ends of a type's own range say nothing about the property.
 ENDS = {'guint': 2**31 - 1, 'gint': 2**31 - 1, 'guint64': 2**64 - 1, 'gdouble': sys.float_info.max}
 
@@ -29,6 +29,8 @@ def number(value):
 def default_of(spec):
     if not spec.flags & GObject.ParamFlags.WRITABLE:
         return ''
+    if spec.value_type.name == 'GstValueArray':
+        return 'empty'
     if spec.value_type.is_a(GObject.TYPE_ENUM):
         return f'`{spec.default_value.value_nick}`'
     if spec.value_type.name == 'gboolean':

@@ -9,7 +9,7 @@ more=${QDMD_MORE:-../shared/measure/sequences}
 [ -d "$more/fall" ] || { echo "Set QDMD_MORE to a folder that has CDnet's fall and pedestrians." >&2; exit 1; }
 
 tests/install-dependencies.sh build test demo docs
-build gst/libgstqdmd.so gst/libgstqdmdscene.so tests/evaluation/qdmd-mask-steps tests/bench/passes
+build gst/libgstqdmd.so gst/libgstqdmdscene.so tests/evaluation/qdmd-mask-steps tests/bench/masks
 
 echo "== steps" >&2
 build/tests/evaluation/qdmd-mask-steps --dataset "$QDMD_DATA" --dataset "$more" >"$results/steps.md"
@@ -35,8 +35,8 @@ build/tests/evaluation/qdmd-mask-steps --dataset "$results/scenes" \
   --plain --only "default,mode=live,OpenCV MOG2,OpenCV KNN" >"$results/scenes.md"
 
 echo "== cost" >&2
-build/tests/bench/passes --benchmark_filter='decide' --benchmark_format=json \
-  --benchmark_repetitions=5 --benchmark_report_aggregates_only=true >"$results/cost.json" 2>/dev/null
+build/tests/bench/masks --benchmark_min_time=0.2 --benchmark_format=json \
+  --benchmark_repetitions=3 --benchmark_report_aggregates_only=true >"$results/cost.json" 2>/dev/null
 
 echo "== pictures" >&2
 mkdir -p docs/images/masks
@@ -46,6 +46,12 @@ if [ -n "$video" ]; then
   build/tests/evaluation/qdmd-mask-steps --dataset "$results/street" --sheet "$results/street.png" \
     --shown 30,60,90
   shrink "$results/street.png" 1400 docs/images/masks/street.jpg
+  for softness in 0 2; do
+    mkdir -p "$results/soft/$softness"
+    gst-launch-1.0 -q filesrc location="$video" ! decodebin ! videoconvert ! videorate ! \
+      video/x-raw,framerate=5/2,format=RGBA ! qdmdbackground output=cutout mask-softness=$softness ! \
+      pngenc compression-level=1 ! multifilesink location="$results/soft/$softness/%03d.png"
+  done
 fi
 for scene in basic,shadow background-motion basic,night; do
   build/tests/evaluation/qdmd-mask-steps --dataset "$results/scenes/$scene" \
@@ -53,3 +59,4 @@ for scene in basic,shadow background-motion basic,night; do
 done
 /usr/bin/python3 tests/pages/masks_page.py docs/masks.md "$results"
 shrink "$results/scenes.png" 960 docs/images/masks/scenes.jpg
+[ ! -f "$results/soft.png" ] || shrink "$results/soft.png" 1280 docs/images/masks/soft.jpg

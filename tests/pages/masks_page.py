@@ -38,11 +38,35 @@ def cost(path):
         runs = json.load(file)['benchmarks']
     medians = {run['run_name'].removesuffix('/manual_time'): run['ns/pixel'] for run in runs
                if run['aggregate_name'] == 'median'}
-    titles = {'decide': 'all steps', 'decide_shadows_foreground': 'shadows=foreground'}
-    sizes = list(dict.fromkeys(name.split('/')[1] for name in medians))
-    return table(['ns a pixel'] + sizes,
-                 [[title] + [f'{medians[f"{name}/{size}"]:.1f}' for size in sizes]
-                  for name, title in titles.items()])
+    titles = {'decide/all': 'all steps', 'decide/without_noise': 'without noise of each pixel',
+              'decide/without_texture': 'without moving textures',
+              'decide/without_light': 'without light', 'decide/without_vote': 'without vote, specks and holes',
+              'decide/without_specks': 'without specks and holes',
+              'decide/alone': 'each pixel by itself', 'decide/half_ignored': 'all steps, half ignored',
+              'decide/noisy': 'all steps in much noise',
+              'decide/noisy_without_smooth': 'in much noise, without means',
+              'soft/1': 'mask-softness=1 adds', 'soft/2': 'mask-softness=2 adds',
+              'soft/4': 'mask-softness=4 adds', 'soft/8': 'mask-softness=8 adds',
+              'soft/15': 'mask-softness=15 adds',
+              'specks/ours/few': 'specks and holes alone',
+              'specks/opencv/few': "the same with OpenCV's connectedComponentsWithStats"}
+    sizes = list(dict.fromkeys(name.split('/')[-1] for name in medians))
+    rows = []
+    for name, title in titles.items():
+        digits = 2 if name.startswith('specks/ours') else 1
+        rows.append([title] + [f'{medians[f"{name}/{size}"]:.{digits}f}' for size in sizes])
+    return table(['ns a pixel'] + sizes, rows)
+
+
+def soft(folder, path):
+    """People of the street scene before one colour: cut out hard, and soft."""
+    pictures = []
+    for softness in (0, 2):
+        cut = matplotlib.image.imread(os.path.join(folder, str(softness), '060.png'))[190:400, 420:740]
+        alpha = cut[..., 3:4]
+        plain = cut[..., :3] * alpha + numpy.array([0.2, 0.45, 0.3]) * (1 - alpha)
+        pictures.append(numpy.kron(plain, numpy.ones((2, 2, 1))))
+    matplotlib.image.imsave(path, numpy.hstack(pictures))
 
 
 def main(page, results):
@@ -53,6 +77,8 @@ def main(page, results):
     sheets = [matplotlib.image.imread(os.path.join(results, f'sheet-{name}.png'))
               for name in ('basic-shadow', 'background-motion', 'basic-night')]
     matplotlib.image.imsave(os.path.join(results, 'scenes.png'), numpy.vstack(sheets))
+    if os.path.isdir(os.path.join(results, 'soft')):
+        soft(os.path.join(results, 'soft'), os.path.join(results, 'soft.png'))
 
 
 if __name__ == '__main__':

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/passes/median_rows.h"
+
 namespace qdmd {
 namespace {
 
@@ -16,6 +18,9 @@ constexpr float kGrowth = 1.3f, kShare = 0.1f;
 constexpr float kLeastGain = 0.01f;
 // Relative change of light that needs no following: less is a part of the noise.
 constexpr float kStill = 0.03f;
+// Light that is followed from frame to frame must make so many of the cells agree, and so many
+// more.
+constexpr float kLeastFollowed = 0.25f, kFollowed = 0.05f, kAllAgree = 0.9f;
 
 float median(std::vector<float>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
@@ -105,19 +110,18 @@ Gain without_noise(const Gain& gain) {
 }  // namespace
 
 GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
-  constexpr int kMost = 64;
-  const int used = std::min(count, kMost);
+  const int used = std::min(count, kMedianRows);
   GridFrames result(frames.cells(), 1);
-  std::vector<float> levels(static_cast<size_t>(used));
-  for (int c = 0; c < kChannels; ++c)
-    for (size_t cell = 0; cell < frames.cells(); ++cell) {
-      for (int i = 0; i < used; ++i) {
-        const int t = static_cast<int>(int64_t{i} * count / used);
-        levels[static_cast<size_t>(i)] =
-            frames.plane(t, c)[cell] / gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
-      }
-      result.plane(0, c)[cell] = median(&levels);
+  for (int c = 0; c < kChannels; ++c) {
+    const float* planes[kMedianRows];
+    float divisors[kMedianRows];
+    for (int i = 0; i < used; ++i) {
+      const int t = static_cast<int>(int64_t{i} * count / used);
+      planes[i] = frames.plane(t, c);
+      divisors[i] = gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
     }
+    median_rows(planes, divisors, static_cast<size_t>(used), frames.cells(), result.plane(0, c));
+  }
   return result;
 }
 
@@ -126,18 +130,105 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
   return without_noise(gain_over(frames, frame, background, reference, scratch));
 }
 
-std::vector<Gain> light_of(const GridFrames& frames, int count) {
+Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
+                   const Gain& before, const Gain& after) {
+  if (std::abs(std::log(brightness(after) / brightness(before))) < kStill) {
+    Gain middle = before;
+    for (size_t c = 0; c < kChannels; ++c) middle[c] = std::sqrt(before[c] * after[c]);
+    return middle;
+  }
+  const float* const of_frame[3] = {frames.plane(frame, 0), frames.plane(frame, 1),
+                                    frames.plane(frame, 2)};
+  const float* const of_reference[3] = {background.plane(reference, 0),
+                                        background.plane(reference, 1),
+                                        background.plane(reference, 2)};
+  const size_t cells = frames.cells();
+  return agreement(of_frame, of_reference, cells, before) >=
+                 agreement(of_frame, of_reference, cells, after)
+             ? before
+             : after;
+}
+
+namespace {
+
+bool changes(const Gain& gain) { return std::abs(std::log(brightness(gain))) > kStill; }
+
+// The mean over frames 0 .. count - 1 of the share of cells that agree with `reference`.
+float mean_agreement(const GridFrames& frames, int count, const std::vector<Gain>& gains,
+                     const GridFrames& reference) {
+  const float* const of_reference[3] = {reference.plane(0, 0), reference.plane(0, 1),
+                                        reference.plane(0, 2)};
+  float sum = 0;
+  for (int t = 0; t < count; ++t) {
+    const float* const of_frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+    sum += agreement(of_frame, of_reference, frames.cells(), gains[static_cast<size_t>(t)]);
+  }
+  return sum / static_cast<float>(count);
+}
+
+// The gain of each frame over their common background, once `gains` are about right: where that
+// makes fewer of its cells agree, its gain stays.
+void sharpen(const GridFrames& frames, int count, LightScratch* scratch, std::vector<Gain>* gains) {
+  const GridFrames reference = median_frame(frames, count, *gains);
+  const float* const of_reference[3] = {reference.plane(0, 0), reference.plane(0, 1),
+                                        reference.plane(0, 2)};
+  for (int t = 0; t < count; ++t) {
+    const float* const of_frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+    Gain& gain = (*gains)[static_cast<size_t>(t)];
+    const Gain sharper = shared_gain(of_frame, of_reference, frames.cells(), scratch);
+    if (agreement(of_frame, of_reference, frames.cells(), sharper) >
+        agreement(of_frame, of_reference, frames.cells(), gain))
+      gain = sharper;
+  }
+}
+
+// What changes from each frame to the next, added up: most of a picture is the same in both, people
+// included, even where no two frames far apart share much of the background.
+std::vector<Gain> followed_light(const GridFrames& frames, int count, LightScratch* scratch) {
   std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
-  if (count < 2) return gains;
-  LightScratch scratch(frames.cells());
+  for (int t = 1; t < count; ++t) {
+    const float* const now[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
+    const float* const before[3] = {frames.plane(t - 1, 0), frames.plane(t - 1, 1),
+                                    frames.plane(t - 1, 2)};
+    const Gain step = shared_gain(now, before, frames.cells(), scratch);
+    for (size_t c = 0; c < kChannels; ++c)
+      gains[static_cast<size_t>(t)][c] =
+          std::max(kLeastGain, gains[static_cast<size_t>(t) - 1][c] * step[c]);
+  }
+  return gains;
+}
+
+// Of each frame by itself, over the median of all.
+std::vector<Gain> light_over_median(const GridFrames& frames, int count, LightScratch* scratch) {
+  std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
   // The second reference is sharper where light changed.
   for (int round = 0; round < 2; ++round) {
     const GridFrames reference = median_frame(frames, count, gains);
     for (int t = 0; t < count; ++t)
-      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0, &scratch);
-    if (std::none_of(gains.begin(), gains.end(), is_lit)) return gains;
+      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0, scratch);
+    if (std::none_of(gains.begin(), gains.end(), is_lit)) break;
   }
-  settle_light(&gains);
+  return gains;
+}
+
+}  // namespace
+
+std::vector<Gain> light_of(const GridFrames& frames, int count) {
+  if (count < 2) return std::vector<Gain>(static_cast<size_t>(count), kSameLight);
+  LightScratch scratch(frames.cells());
+  std::vector<Gain> gains = light_over_median(frames, count, &scratch);
+  const float agree = mean_agreement(frames, count, gains, median_frame(frames, count, gains));
+  // Where nearly all agrees, nothing is left to be followed.
+  if (agree < kAllAgree) {
+    std::vector<Gain> followed = followed_light(frames, count, &scratch);
+    if (std::any_of(followed.begin(), followed.end(), changes)) {
+      sharpen(frames, count, &scratch, &followed);
+      const float better =
+          mean_agreement(frames, count, followed, median_frame(frames, count, followed));
+      if (better > std::max(kLeastFollowed, agree + kFollowed)) gains = std::move(followed);
+    }
+  }
+  if (std::any_of(gains.begin(), gains.end(), is_lit)) settle_light(&gains);
   return gains;
 }
 

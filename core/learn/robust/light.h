@@ -38,6 +38,12 @@ class LightScratch {
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch);
 
+// The gain of one frame over picture `reference` of `background`, where the frames before and after
+// it have the gains `before` and `after`: between them, or, where the light changed by more than a
+// little, one of them.
+Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
+                   const Gain& before, const Gain& after);
+
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.
 void settle_light(std::vector<Gain>* gains);

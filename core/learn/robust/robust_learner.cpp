@@ -19,6 +19,26 @@ int chosen_step(int width, int height) {
 // Samples along the short side that the coarsest step leaves: half of those that are chosen.
 constexpr size_t kFewestSamples = 28;
 
+// Every second frame of a window like the default's tells nearly as much of its background as all
+// do, in half of the time. Fewer frames than kLeastSnapshots tell less; a window of kLong frames
+// and more is for the best background that there is.
+constexpr int kLeastSnapshots = 50, kLong = 200;
+int stride_of(int frames) { return frames >= 2 * kLeastSnapshots && frames < kLong ? 2 : 1; }
+int most_snapshots(int window_size) {
+  if (window_size >= kLong) return window_size;
+  return std::max(std::min(window_size, 2 * kLeastSnapshots - 1), (window_size + 1) / 2);
+}
+
+// One frame in so many may be remembered, for so many windows.
+constexpr int kRememberedStep = 4, kRememberedWindows = 64;
+
+// Of frames that are one frame apart, from one of frames that are `stride` apart.
+void divide_time(int stride, DmdSummary* summary) {
+  summary->omega /= stride;
+  summary->lambda = std::polar(std::pow(std::abs(summary->lambda), 1.0 / stride),
+                               std::arg(summary->lambda) / stride);
+}
+
 }  // namespace
 
 RobustLearner::RobustLearner(const LearnOptions& options, int width, int height,
@@ -42,32 +62,40 @@ std::vector<int> RobustLearner::sample_steps() const {
   return steps;
 }
 
+int RobustLearner::remembered_frames(int window_size) const {
+  const double share = static_cast<double>(parameters_.remembered_share) * window_size;
+  return std::min(static_cast<int>(share), parameters_.start_frames / 2);
+}
+
 size_t RobustLearner::samples_at(int step) const {
   return sample_count(grid_.width, grid_.height, step);
 }
 
-uint64_t RobustLearner::bytes(int window_size, int capacity, Models models, int threads) const {
+uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) const {
   const auto workers = static_cast<uint64_t>(threads);
   DmdOptions dmd = options_.dmd;
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
-  const uint64_t looks = static_cast<uint64_t>(std::min(window_size, parameters_.start_frames)) + 1;
+  const int snapshots = most_snapshots(window_size), remembered = remembered_frames(window_size);
+  const auto looks =
+      static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) + remembered + 1);
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
   const uint64_t pictures = pixels() * (2 * kChannels + 4);
   const uint64_t kept =
       pictures + LightScratch::bytes(grid_.cells()) + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
-      StableFrames::bytes(grid_, looks) + WindowMask::bytes(capacity, pixels()) +
-      PlaneSlots::bytes(capacity, samples_at(finest_step_)) +
-      SlidingGram::bytes(capacity, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
+      StableFrames::bytes(grid_, looks) + WindowMask::bytes(snapshots, pixels()) +
+      PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
+      SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
+      StandingLooks::bytes(grid_) + static_cast<uint64_t>(window_size) * sizeof(Gain);
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
        pixels());
   // One after another: what a start compares, with densities and then a spread; masks; the
   // decomposition; the combination.
-  const uint64_t start = GridFrames::bytes(grid_, window_size) +
+  const uint64_t start = GridFrames::bytes(grid_, snapshots + 1) +
                          GridFrames::bytes(grid_, static_cast<int>(looks)) +
-                         std::max<uint64_t>(levels(2 * looks), pixels());
+                         std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
   return kept + made +
@@ -81,7 +109,8 @@ double RobustLearner::solve_seconds(int window_size) const {
   // Passes over pixels, and over the grid, which has at most so many cells as small pictures have
   // pixels.
   const double n = static_cast<double>(pixels()), small = std::min(1.0, n / 3000);
-  return options_.iterations * (8e-3 * small + window_size * (5.5e-4 * small + 4.2e-9 * n));
+  const int snapshots = (window_size + stride_of(window_size) - 1) / stride_of(window_size);
+  return options_.iterations * (1e-3 * small + snapshots * (2.5e-4 * small + 2.2e-9 * n));
 }
 
 uint64_t RobustLearner::solver_bytes(int window_size) const {
@@ -92,20 +121,29 @@ uint64_t RobustLearner::solver_bytes(int window_size) const {
 
 void RobustLearner::begin(const LearnerRoom& room) {
   room_ = room;
-  const int capacity = room.frames->capacity();
+  const int snapshots = most_snapshots(room.window_size);
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = Earlier(grid_);
-  mask_ = WindowMask(capacity, pixels());
-  samples_ = Window(capacity, samples_at(finest_step_));
-  gram_ = SlidingGram(capacity, room.pool);
+  looks_ = StandingLooks(grid_);
+  memory_ = FrameMemory(remembered_frames(room.window_size), pixels(), grid_);
+  mask_ = WindowMask(snapshots, pixels());
+  samples_ = Window(snapshots, samples_at(finest_step_));
+  gram_ = SlidingGram(snapshots, room.pool);
   for (auto& level : reference_.level) level.resize(pixels());
   reference_.threshold.resize(pixels());
   spread_.resize(pixels());
   // Runs read to their end.
   reach_.resize(room.frames->window().plane_size());
+}
+
+void RobustLearner::forget() {
+  earlier_.forget();
+  memory_.forget();
+  looks_.forget();
+  stream_from_ = -1;
 }
 
 void RobustLearner::remember(Learnt* learnt) const {
@@ -126,6 +164,55 @@ void RobustLearner::follow(const std::vector<uint8_t> level[kChannels]) {
     cell_means(grid_, level[c].data(), background_cells_.plane(published_, c));
 }
 
+void RobustLearner::mend(const SnapshotRange& newest, double t, BackgroundModel* model) {
+  const int slot = newest.slot(newest.size() - 1);
+  const GridFrames& cells = room_.frames->cells();
+  const float* const frame[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
+  const Gain light = model->light();
+  looks_.follow(frame, light);
+  const float* const background[3] = {background_cells_.plane(published_, 0),
+                                      background_cells_.plane(published_, 1),
+                                      background_cells_.plane(published_, 2)};
+  const std::vector<int>& uncovered = looks_.uncovered(background);
+  if (uncovered.empty()) return;
+  model->set_light(kSameLight);
+  model->freeze_at(t);
+  replace(uncovered, newest, light, model);
+  model->set_light(light);
+}
+
+// The median of the newest frames, every second one, in place of the background of these cells.
+void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& newest,
+                            const Gain& light, BackgroundModel* model) {
+  const SnapshotRange frames = newest.every(2);
+  const auto count = static_cast<size_t>(frames.size());
+  const uint8_t* planes[kChannels * kMendingFrames];
+  float inverse[kChannels * kMendingFrames];
+  for (size_t i = 0; i < count; ++i)
+    for (size_t c = 0; c < kChannels; ++c) {
+      planes[kChannels * i + c] = frames.plane(static_cast<int>(i), static_cast<int>(c));
+      inverse[kChannels * i + c] = 1 / light[c];
+    }
+  const auto stride = static_cast<size_t>(grid_.width);
+  for (int cell : cells) {
+    const int row = cell / grid_.cols, col = cell % grid_.cols;
+    const int left = grid_.left(col), right = grid_.left(col + 1);
+    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
+      for (int x = left; x < right; x += kMedianBlock) {
+        const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
+        const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
+        const uint8_t* rows[kChannels * kMendingFrames];
+        for (size_t i = 0; i < kChannels * count; ++i) rows[i] = planes[i] + first;
+        uint8_t level[kChannels][kMedianBlock], spread[kMedianBlock];
+        uint8_t* const out[3] = {level[0], level[1], level[2]};
+        median_block(rows, inverse, count, width, 1, stride, out, spread);
+        model->replace(first, width, out);
+      }
+    for (int c = 0; c < kChannels; ++c)
+      background_cells_.plane(published_, c)[cell] = looks_.level(cell, c);
+  }
+}
+
 void RobustLearner::set_sample_step(int step) {
   step_ = step;
   samples_.resize(samples_at(step_));
@@ -141,7 +228,9 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
       std::copy_n(cells.plane(snapshots.slot(t), c), grid_.cells(), frames.plane(t, c));
   gains_ = light_of(frames, m);
 
-  const int count = std::min(m, parameters_.start_frames);
+  const int of_window = std::min(m, parameters_.start_frames);
+  const int old = memory_.older_than(first_number());
+  const int count = of_window + old;
   std::vector<LitPicture> pictures(static_cast<size_t>(count));
   GridFrames chosen(grid_, count + 1);
   const auto choose = [&](const GridFrames& from, int frame, int i, const LitPicture& picture) {
@@ -152,23 +241,36 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
                      [inverse](float level) { return level * inverse; });
     }
   };
-  for (int i = 0; i < count; ++i) {
-    const int t = static_cast<int>(int64_t{i} * m / count);
-    choose(frames, t, i,
+  // What was seen before, in the light of this window.
+  GridFrames here;
+  if (old > 0 || earlier_.known()) here = median_frame(frames, m, gains_);
+  LightScratch scratch(grid_.cells());
+  for (int i = 0; i < old; ++i)
+    choose(memory_.cells(), memory_.slot(i), i,
+           {{memory_.plane(i, 0), memory_.plane(i, 1), memory_.plane(i, 2)},
+            light_over(memory_.cells(), memory_.slot(i), here, 0, &scratch)});
+  for (int i = 0; i < of_window; ++i) {
+    const int t = static_cast<int>(int64_t{i} * m / of_window);
+    choose(frames, t, old + i,
            {{snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
             gains_[static_cast<size_t>(t)]});
   }
   Recollection recollection;
   if (earlier_.known()) {
-    const GridFrames here = median_frame(frames, m, gains_);
     pictures.emplace_back();
-    LightScratch scratch(grid_.cells());
     const Gain gain = light_over(earlier_.cells(), 0, here, 0, &scratch);
     choose(earlier_.cells(), 0, count, earlier_.picture(gain));
     recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
+    recollection.older_frames = old;
   }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
                                room_.pool);
+  if (stable_.another_scene && old > 0) {
+    memory_.forget();
+    earlier_.forget();
+    start(snapshots);
+    return;
+  }
   start_frames_ = count;
 
   uint8_t* background[kChannels];
@@ -230,7 +332,9 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
     });
     gram_.add_newest(samples_, samples_.size());
   }
-  return qdmd::decompose(samples_, gram_.matrix(samples_), options_.dmd);
+  DmdOptions options = options_.dmd;
+  options.omega_threshold *= stride_;
+  return qdmd::decompose(samples_, gram_.matrix(samples_), options);
 }
 
 // The modes' pictures from filled frames, run by run.
@@ -276,10 +380,12 @@ void RobustLearner::decompose(const SnapshotRange& snapshots) {
   fresh_ = std::min(1.0f,
                     static_cast<float>(seen - frames_seen_) / static_cast<float>(snapshots.size()));
   frames_seen_ = seen;
+  if (stream_from_ < 0) stream_from_ = first_number();
 }
 
 void RobustLearner::build(Slice, BackgroundModel* model) {
-  const SnapshotRange& snapshots = *snapshots_;
+  stride_ = stride_of(snapshots_->size());
+  const SnapshotRange snapshots = snapshots_->every(stride_);
   const Clock::Spent before = room_.clock->spent();
   facts_ = {};
   {
@@ -290,16 +396,47 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       find_foreground(snapshots);
       const Decomposition decomposition = decompose_filled(snapshots);
       facts_.dmd = decomposition.summary;
+      divide_time(stride_, &facts_.dmd);
       model->begin(snapshots, decomposition.background, true);
+      model->set_stride(stride_);
       combine(snapshots, model);
-      take_reference(model, snapshots.size() / 2);
+      take_reference(model, snapshots_->size() / 2);
     }
     end(model);
   }
-  facts_.window_frames = snapshots.size();
+  facts_.window_frames = snapshots_->size();
   facts_.sample_step = step_;
   facts_.iterations = options_.iterations;
   facts_.solve_time = room_.clock->spent().since(before).of_solves();
+}
+
+// Of all frames of the window: those between the snapshots have a light of their own.
+std::vector<Gain> RobustLearner::gains_of_frames() const {
+  if (stride_ == 1) return gains_;
+  std::vector<Gain> gains(static_cast<size_t>(snapshots_->size()), kSameLight);
+  for (int t = 0; t < snapshots_->size(); ++t) {
+    Gain& gain = gains[static_cast<size_t>(t)];
+    const auto before = static_cast<size_t>(t / stride_);
+    gain = gains_[before];
+    if (t % stride_ == 0) continue;
+    gain =
+        light_between(room_.frames->cells(), snapshots_->slot(t), background_cells_, 1 - published_,
+                      gains_[before], gains_[std::min(before + 1, gains_.size() - 1)]);
+    const uint8_t* const x[3] = {snapshots_->plane(t, 0), snapshots_->plane(t, 1),
+                                 snapshots_->plane(t, 2)};
+    if (is_lit(gain)) gain = refine_gain(reference_, x, gain, step_);
+  }
+  return gains;
+}
+
+// For windows to come.
+void RobustLearner::keep_some() {
+  for (int i = 0; i < snapshots_->size(); ++i) {
+    const int64_t number = first_number() + i;
+    if ((number - stream_from_) % kRememberedStep != 0 || number <= memory_.newest()) continue;
+    memory_.keep(number, *snapshots_, i, room_.frames->cells(),
+                 int64_t{kRememberedWindows} * room_.window_size);
+  }
 }
 
 // What others ask the model, and what later windows are told.
@@ -309,7 +446,8 @@ void RobustLearner::end(BackgroundModel* model) {
                background_cells_.plane(1 - published_, c));
   if (parameters_.earlier_share > 0)
     earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh_);
-  model->set_gains(gains_);
+  model->set_gains(gains_of_frames());
+  keep_some();
   std::copy(reference_.threshold.begin(), reference_.threshold.end(), model->make_limits());
 }
 

@@ -8,8 +8,10 @@
 #include "core/gram/gram.h"
 #include "core/learn/learner.h"
 #include "core/learn/robust/earlier.h"
+#include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/stable_frames.h"
+#include "core/learn/robust/standing_looks.h"
 #include "core/passes/fill.h"
 
 namespace qdmd {
@@ -28,6 +30,9 @@ struct RobustParameters {
   // What an earlier window's background counts at most, in start frames of this one; 0: windows
   // know nothing of each other.
   float earlier_share = 0.5f;
+  // Frames that are kept once they have left the window, as a share of it, but not more than half
+  // of the start frames.
+  float remembered_share = 0.5f;
 };
 
 // The paper ends with the wish to combine Q-DMD with sparse methods; this is such a combination.
@@ -52,7 +57,7 @@ class RobustLearner : public Learner {
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;
-  void forget() override { earlier_.forget(); }
+  void forget() override;
   void remember(Learnt* learnt) const override;
   void recall(const Learnt& learnt) override;
   bool makes_limits() const override { return true; }
@@ -63,6 +68,8 @@ class RobustLearner : public Learner {
   SolveFacts facts() const override { return facts_; }
   void publish() override { published_ = 1 - published_; }
 
+  void mend(const SnapshotRange& newest, double t, BackgroundModel* model) override;
+
   bool follows_light() const override { return true; }
   void follow(const std::vector<uint8_t> level[kChannels]) override;
   Gain light(int slot) override {
@@ -72,6 +79,9 @@ class RobustLearner : public Learner {
  private:
   size_t pixels() const { return reference_.pixels(); }
   size_t samples_at(int step) const;
+  int remembered_frames(int window_size) const;
+  // Of the first snapshot, counted like FrameStore::frames_taken().
+  int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }
   void start(const SnapshotRange& snapshots);
   void refine_light(const SnapshotRange& snapshots);
   void recall_spread(std::vector<uint8_t>* spread) const;
@@ -79,6 +89,10 @@ class RobustLearner : public Learner {
   Decomposition decompose_filled(const SnapshotRange& snapshots);
   void combine(const SnapshotRange& snapshots, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
+  std::vector<Gain> gains_of_frames() const;
+  void keep_some();
+  void replace(const std::vector<int>& cells, const SnapshotRange& newest, const Gain& light,
+               BackgroundModel* model);
   void end(BackgroundModel* model);
 
   LearnOptions options_;
@@ -90,10 +104,15 @@ class RobustLearner : public Learner {
   int published_ = 0;
   LightScratch light_scratch_;  // of light()
   Earlier earlier_;
-  // Of the newest solve: its snapshots, the share of them that no solve before had, frames that the
-  // start compared, and what it found.
+  FrameMemory memory_;
+  StandingLooks looks_;  // of the frames that were compared with the background in use
+  // Of the newest solve: its window, the share of it that no solve before had, of which every
+  // stride-th frame is a snapshot of the decomposition, frames that the start compared, and what it
+  // found.
   std::optional<SnapshotRange> snapshots_;
   float fresh_ = 1;
+  int stride_ = 1;
+  int64_t stream_from_ = -1;  // the first frame since forget(); -1: none was solved
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
   StableFrames stable_;

@@ -3,20 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/learn/robust/contour.h"
 #include "core/passes/patch_density.h"
 
 namespace qdmd {
 namespace {
 
-// A region that differs from the background by more than this many levels (mean of the channels)
-// may be what the background looks like without an object. Smaller regions than kLeastCells, looks
-// that fewer than kLeastSupport of the frames share (in units of alike frames, at least two) and
-// contours that are not weaker by kMargin do not count.
-constexpr float kChange = 10;
-constexpr int kLeastCells = 6;
+// Looks that fewer than this share of the frames show (in units of alike frames, at least two) do
+// not count.
 constexpr float kLeastSupport = 0.04f;
-constexpr float kMargin = 1.2f;
-constexpr size_t kLeastContour = 8;
 // The share of cells that must show what an earlier window did: people seldom hide more.
 constexpr float kLeastSeen = 0.15f;
 // Frames that propose regions.
@@ -47,76 +42,6 @@ class GridPicture {
   std::vector<float> levels_;
 };
 
-// Regions of connected cells, diagonals included.
-class Regions {
- public:
-  explicit Regions(const Grid& grid) : grid_(grid), region_of_(grid.cells()) {}
-
-  // The regions of cells where `inside` is set, each a list of cells.
-  const std::vector<std::vector<int>>& find(const std::vector<uint8_t>& inside) {
-    regions_.clear();
-    std::fill(region_of_.begin(), region_of_.end(), -1);
-    for (size_t cell = 0; cell < inside.size(); ++cell) {
-      if (!inside[cell] || region_of_[cell] >= 0) continue;
-      const int id = static_cast<int>(regions_.size());
-      auto& region = regions_.emplace_back();
-      region.push_back(static_cast<int>(cell));
-      region_of_[cell] = id;
-      for (size_t next = 0; next < region.size(); ++next) {
-        const int y = region[next] / grid_.cols, x = region[next] % grid_.cols;
-        for (int yy = std::max(0, y - 1); yy <= std::min(grid_.rows - 1, y + 1); ++yy)
-          for (int xx = std::max(0, x - 1); xx <= std::min(grid_.cols - 1, x + 1); ++xx) {
-            const auto neighbour = static_cast<size_t>(yy * grid_.cols + xx);
-            if (!inside[neighbour] || region_of_[neighbour] >= 0) continue;
-            region_of_[neighbour] = id;
-            region.push_back(static_cast<int>(neighbour));
-          }
-      }
-    }
-    return regions_;
-  }
-  bool in(int region, int cell) const { return region_of_[static_cast<size_t>(cell)] == region; }
-
- private:
-  const Grid& grid_;
-  std::vector<int> region_of_;
-  std::vector<std::vector<int>> regions_;
-};
-
-// The strength of a picture's edges along a region's border: differences of the cells on both sides
-// of each border cell, a channel's mean.
-class Contour {
- public:
-  Contour(const Grid& grid, const Regions& regions, int region, const std::vector<int>& cells) {
-    const auto note = [&](int before, int after) {
-      if (regions.in(region, before) != regions.in(region, after))
-        pairs_.emplace_back(before, after);
-    };
-    // Each pair of cells two apart, of which one is inside, is met from its inside one.
-    for (int cell : cells) {
-      const int y = cell / grid.cols, x = cell % grid.cols;
-      if (y + 2 < grid.rows) note(cell, cell + 2 * grid.cols);
-      if (y >= 2) note(cell - 2 * grid.cols, cell);
-      if (x + 2 < grid.cols) note(cell, cell + 2);
-      if (x >= 2) note(cell - 2, cell);
-    }
-  }
-  size_t size() const { return pairs_.size(); }
-  // planes: of a picture.
-  float strength(const float* const planes[3]) const {
-    double sum = 0;
-    for (const auto& [a, b] : pairs_) {
-      float d = 0;
-      for (int c = 0; c < kChannels; ++c) d += std::abs(planes[c][a] - planes[c][b]);
-      sum += std::min(d / 3, kMostDistance);
-    }
-    return static_cast<float>(sum / static_cast<double>(pairs_.size()));
-  }
-
- private:
-  std::vector<std::pair<int, int>> pairs_;
-};
-
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
 // a contour that the true background does not have.
@@ -126,7 +51,7 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
   const size_t cells = grid.cells();
   GridPicture background(frames, *from);
   const float* const b[3] = {background.plane(0), background.plane(1), background.plane(2)};
-  Regions regions(grid);
+  CellRegions regions(grid);
   std::vector<uint8_t> differs(cells);
   const int proposals = std::min(count, kProposals);
   const int looks = static_cast<int>(density.size() / cells);
@@ -137,22 +62,18 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
           i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
       const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
       for (size_t cell = 0; cell < cells; ++cell) {
-        float d = 0;
-        for (int c = 0; c < kChannels; ++c) d += std::abs(f[c][cell] - b[c][cell]);
-        differs[cell] = d > 3 * kChange;
+        differs[cell] = differs_at(f, b, cell);
       }
       const auto& found = regions.find(differs);
       for (size_t region = 0; region < found.size(); ++region) {
         const std::vector<int>& inside = found[region];
-        if (inside.size() < static_cast<size_t>(kLeastCells)) continue;
+        if (inside.size() < kLeastRegion) continue;
         double support = 0;
         for (int cell : inside)
           support += density[static_cast<size_t>(t) * cells + static_cast<size_t>(cell)];
         support /= static_cast<double>(inside.size());
         if (support < std::max(2.0, kLeastSupport * static_cast<double>(count))) continue;
-        const Contour contour(grid, regions, static_cast<int>(region), inside);
-        if (contour.size() < kLeastContour) continue;
-        if (contour.strength(b) <= kMargin * contour.strength(f) + 1) continue;
+        if (!Contour(grid, regions, static_cast<int>(region), inside).is_weaker(f, b)) continue;
         for (int cell : inside) {
           (*from)[static_cast<size_t>(cell)] = t;
           background.take(frames, t, static_cast<size_t>(cell));
@@ -165,28 +86,49 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
 }
 
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
-// too little of it is seen in any frame: the camera moved, or the scene is another.
-bool add_recollection(const Grid& grid, const GridFrames& frames, int count,
-                      const Recollection& earlier, Pool* pool, std::vector<float>* density) {
-  const size_t cells = grid.cells();
-  std::vector<float> alike(density->size());
-  patch_distance(grid, frames, count, std::vector<int>(cells, count).data(), pool, alike.data());
-  for (float& a : alike) a = std::max(0.0f, 1 - a / kSimilar);
+// too little of it is seen in any new frame.
+bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recollection& earlier,
+                      std::vector<float>* density) {
+  std::vector<float> alike(cells);
   float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
   std::fill_n(of_earlier, cells, 0.0f);
-  for (int t = 0; t < count; ++t)
-    for (size_t cell = 0; cell < cells; ++cell)
-      of_earlier[cell] += alike[static_cast<size_t>(t) * cells + cell];
+  const auto add = [&](int first, int end) {
+    for (int t = first; t < end; ++t) {
+      patches->alike(t, count, alike.data());
+      for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += alike[cell];
+    }
+  };
+  add(earlier.older_frames, count);
   const auto seen = std::count_if(of_earlier, of_earlier + cells,
                                   [](float frames_alike) { return frames_alike > 0; });
   if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
-  for (int t = 0; t < count; ++t)
-    for (size_t cell = 0; cell < cells; ++cell) {
-      const size_t at = static_cast<size_t>(t) * cells + cell;
-      (*density)[at] += earlier.weight[cell] * alike[at];
-    }
+  add(0, earlier.older_frames);
+  for (int t = 0; t < count; ++t) {
+    patches->alike(t, count, alike.data());
+    float* of_frame = density->data() + static_cast<size_t>(t) * cells;
+    for (size_t cell = 0; cell < cells; ++cell)
+      of_frame[cell] += earlier.weight[cell] * alike[cell];
+  }
   for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += earlier.weight[cell];
   return true;
+}
+
+// How far a frame that shows the background may be: distance, of all frames less one. scratch: as
+// many.
+float limit_of(std::span<const float> distance, size_t left_out, std::span<float> scratch) {
+  const size_t others = distance.size() - (left_out < distance.size() ? 1 : 0);
+  const auto nearest = static_cast<size_t>(kNearest * static_cast<double>(others - 1));
+  constexpr float kLeast = kSimilar / 2;
+  // Where enough frames are near, it is no matter how near.
+  size_t near = 0;
+  for (float d : distance) near += kNear * d <= kLeast ? 1 : 0;
+  if (left_out < distance.size() && kNear * distance[left_out] <= kLeast) --near;
+  if (near > nearest) return kLeast;
+  std::copy(distance.begin(), distance.end(), scratch.begin());
+  if (left_out < distance.size()) std::swap(scratch[left_out], scratch[others]);
+  std::nth_element(scratch.begin(), scratch.begin() + static_cast<ptrdiff_t>(nearest),
+                   scratch.begin() + static_cast<ptrdiff_t>(others));
+  return std::max(kLeast, kNear * scratch[nearest]);
 }
 
 }  // namespace
@@ -195,45 +137,61 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
                                 const Recollection* earlier, Pool* pool) {
   const size_t cells = grid.cells();
   std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
-  patch_density(grid, frames, count, pool, density.data());
-  if (earlier && !add_recollection(grid, frames, count, *earlier, pool, &density)) {
-    earlier = nullptr;
-    density.resize(cells * static_cast<size_t>(count));
+  StableFrames result;
+  {
+    PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
+    patches.density(count, pool, density.data());
+    if (earlier && !add_recollection(cells, &patches, count, *earlier, &density)) {
+      result.another_scene = true;
+      earlier = nullptr;
+      density.resize(cells * static_cast<size_t>(count));
+    }
   }
   const int looks = count + (earlier ? 1 : 0);
-  std::vector<int> from(cells);
-  for (size_t cell = 0; cell < cells; ++cell) {
-    from[cell] = 0;
-    for (int t = 1; t < looks; ++t)
-      if (density[static_cast<size_t>(t) * cells + cell] >
-          density[static_cast<size_t>(from[cell]) * cells + cell])
-        from[cell] = t;
+  std::vector<int> from(cells, 0);
+  std::vector<float> most(density.begin(), density.begin() + static_cast<ptrdiff_t>(cells));
+  for (int t = 1; t < looks; ++t) {
+    const float* of_frame = density.data() + static_cast<size_t>(t) * cells;
+    for (size_t cell = 0; cell < cells; ++cell) {
+      from[cell] = of_frame[cell] > most[cell] ? t : from[cell];
+      most[cell] = std::max(most[cell], of_frame[cell]);
+    }
   }
   compare_contours(grid, frames, count, density, &from);
 
-  std::vector<float>& distance = density;
+  std::vector<float>().swap(density);
+  std::vector<uint16_t> distance(cells * static_cast<size_t>(looks));
   patch_distance(grid, frames, looks, from.data(), pool, distance.data());
-  StableFrames result;
   result.of_cell = FrameLists(cells, looks);
   result.limit.resize(cells);
-  std::vector<float> sorted(static_cast<size_t>(count));
-  for (size_t cell = 0; cell < cells; ++cell) {
-    // A frame is not its own neighbour, but of two it would be wrong to trust the other.
-    size_t others = 0;
-    for (int t = 0; t < count; ++t)
-      if (t != from[cell] || count <= 2)
-        sorted[others++] = distance[static_cast<size_t>(t) * cells + cell];
-    const auto nearest =
-        sorted.begin() + static_cast<ptrdiff_t>(kNearest * static_cast<double>(others - 1));
-    std::nth_element(sorted.begin(), nearest, sorted.begin() + static_cast<ptrdiff_t>(others));
-    float limit = std::max(kSimilar / 2, kNear * *nearest);
-    // No frame need show what an earlier window did.
-    if (from[cell] == count) limit = std::min(limit, earlier->limit[cell]);
-    result.limit[cell] = limit;
-    for (int t = 0; t < looks; ++t)
-      if (distance[static_cast<size_t>(t) * cells + cell] <= limit) result.of_cell.add(cell, t);
-  }
+  const auto all = static_cast<size_t>(count), cols = static_cast<size_t>(grid.cols);
+  const size_t room = static_cast<size_t>(looks) + all;
+  std::vector<float> rooms(room * pool->threads());
+  pool->run(static_cast<size_t>(grid.rows), [&](size_t row, size_t worker) {
+    float *of_cell = rooms.data() + worker * room, *scratch = of_cell + looks;
+    for (size_t col = 0; col < cols; ++col) {
+      const size_t cell = row * cols + col;
+      const auto steps =
+          static_cast<float>(kChannels * kStepsPerLevel *
+                             patch_cells(grid, static_cast<int>(row), static_cast<int>(col)));
+      for (size_t t = 0; t < static_cast<size_t>(looks); ++t)
+        of_cell[t] = static_cast<float>(distance[cell * static_cast<size_t>(looks) + t]) / steps;
+      // A frame is not its own neighbour, but of two it would be wrong to trust the other.
+      const auto left_out = count > 2 ? static_cast<size_t>(from[cell]) : all;
+      float limit = limit_of({of_cell, all}, left_out, {scratch, all});
+      // No frame of the window need show what an earlier one did.
+      if (earlier && (from[cell] == count || from[cell] < earlier->older_frames))
+        limit = std::min(limit, earlier->limit[cell]);
+      result.limit[cell] = limit;
+      result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
+    }
+  });
   return result;
+}
+
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks) {
+  return std::max(sizeof(float) * looks * grid.cells() + PatchFrames::bytes(grid, looks),
+                  patch_distance_bytes(grid, looks));
 }
 
 }  // namespace qdmd

@@ -28,6 +28,18 @@ class FrameLists {
   void add(size_t cell, int frame) {
     frames_[cell * most_ + counts_[cell]++] = static_cast<uint16_t>(frame);
   }
+  // Makes it the list of frames t < `most` with shows(t).
+  template <typename Shows>
+  void take(size_t cell, Shows shows) {
+    uint16_t* list = frames_.data() + cell * most_;
+    size_t count = 0;
+    // Without a branch that nobody foresees.
+    for (size_t t = 0; t < most_; ++t) {
+      list[count] = static_cast<uint16_t>(t);
+      count += shows(t) ? 1 : 0;
+    }
+    counts_[cell] = static_cast<uint16_t>(count);
+  }
 
  private:
   size_t most_ = 0;
@@ -39,6 +51,8 @@ class FrameLists {
 struct StableFrames {
   FrameLists of_cell;
   std::vector<float> limit;
+  // Too little of what was known before is seen again: the camera moved, or the scene is another.
+  bool another_scene = false;
 
   // Where `looks` frames are compared.
   static uint64_t bytes(const Grid& grid, uint64_t looks) {
@@ -50,6 +64,7 @@ struct StableFrames {
 // patches are alike up to `limit`.
 struct Recollection {
   std::vector<float> weight, limit;
+  int older_frames = 0;  // of those that are compared with it, the first so many are no news
 };
 
 // frames: `count` pictures in one light, and a further one of the background in earlier windows
@@ -58,5 +73,7 @@ struct Recollection {
 // frame's region fits its surroundings better: what stands still for long shows by its contour.
 StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
                                 const Recollection* earlier, Pool* pool);
+// The memory that it takes while it looks for them.
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks);
 
 }  // namespace qdmd

@@ -1,0 +1,37 @@
+#include "core/foreground/ignored.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace qdmd {
+
+bool IgnoredAreas::add(const Rectangle& area) {
+  if (area.width < 1 || area.height < 1 || count_ == kMost) return false;
+  areas_[count_++] = area;
+  return true;
+}
+
+void IgnoredAreas::clear(int y, int left, int count, uint8_t* samples) const {
+  visit(y, left, count, [&](int64_t begin, int64_t end) {
+    std::memset(samples + begin, 0, static_cast<size_t>(end - begin));
+  });
+}
+
+void IgnoredAreas::clear_run(size_t first, size_t count, int width, uint8_t* samples) const {
+  if (empty()) return;
+  const auto row = static_cast<size_t>(width);
+  for (size_t done = 0; done < count;) {
+    const size_t left = (first + done) % row, size = std::min(row - left, count - done);
+    clear(static_cast<int>((first + done) / row), static_cast<int>(left), static_cast<int>(size),
+          samples + done);
+    done += size;
+  }
+}
+
+void IgnoredAreas::clear_rows(int first_row, int row_count, int width, uint8_t* picture) const {
+  const auto row = static_cast<size_t>(width);
+  const size_t first = static_cast<size_t>(first_row) * row;
+  clear_run(first, static_cast<size_t>(row_count) * row, width, picture + first);
+}
+
+}  // namespace qdmd
