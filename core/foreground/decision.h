@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/foreground/decision_steps.h"
 #include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
@@ -34,16 +35,6 @@ struct Comparison {
   const IgnoredAreas* ignored = nullptr;
 };
 
-// Steps that can be left out, to see what they are worth (docs/masks.md); users have no say in it.
-struct DecisionSteps {
-  bool smooth = true;   // means of 3 x 3 pixels where there is much noise
-  bool noise = true;    // PixelNoise
-  bool texture = true;  // MovingTexture
-  bool light = true;    // find_shaded
-  bool vote = true;
-  bool specks = true;  // Specks; only after a vote
-};
-
 // A pixel that differs from L is foreground unless
 //   - it is L in another light (find_shaded; see Shadows; not in grey pictures),
 //   - it is hardly further from L than it is all the time (PixelNoise),
@@ -70,41 +61,71 @@ class Decision {
   // Decides the next frame: what follows is about it. pool: or null. Results do not depend on it.
   void decide(const Comparison& frame, Pool* pool);
   // 255 where foreground, else 0; width * height samples in row order.
-  const uint8_t* mask() const { return mask_.data(); }
+  const uint8_t* mask() const { return of_.mask.data(); }
   // The same where shadows are marked: 255 where light alone differs.
-  const uint8_t* shaded() const { return shadows_ == Shadows::marked ? shaded_.data() : nullptr; }
+  const uint8_t* shaded() const {
+    return shadows_ == Shadows::marked ? of_.shaded.data() : nullptr;
+  }
   // L of a row in that frame, 3 planes.
   void level(int y, const uint8_t* out[3]) const;
 
  private:
+  // The pictures' shape. Rows are `stride` samples apart and have `margin` samples more on both
+  // sides; the background is searched `step` pixels apart, and `reach` pixels vote.
+  struct Shape {
+    int width, height, step, margin, reach;
+    size_t stride;
+
+    Shape(int width, int height, bool votes);
+    size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
+    size_t padded() const { return stride * static_cast<size_t>(height); }
+    // Of a row with margins, and of one without.
+    size_t offset(int y) const {
+      return static_cast<size_t>(y) * stride + static_cast<size_t>(margin);
+    }
+    size_t first(int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width); }
+  };
+  // Of the frame: L, what differs from it, and what is foreground before and after the vote; and
+  // where light alone differs.
+  struct Pictures {
+    std::vector<uint8_t> level[3], differing, foreground, mask, shaded;
+  };
+  // What is compared, and how: means or pixels, above how many levels; textures that move are
+  // looked for.
+  struct Now {
+    Comparison frame = {};
+    Pool* pool = nullptr;
+    bool means = false, textures = false;
+    double threshold = 0;
+  };
   // Pixels left .. left + count - 1 of a row.
   struct Run;
   template <int kReach, int kMost>
   struct Around;
+  struct Lit;
 
-  // Rows are `stride_` samples apart and have `margin_` samples more on both sides.
-  size_t offset(int y) const {
-    return static_cast<size_t>(y) * stride_ + static_cast<size_t>(margin_);
-  }
-  uint8_t* level_row(int channel, int y) { return level_[channel].data() + offset(y); }
-  uint8_t* differing_row(int y) { return differing_.data() + offset(y); }
-  uint8_t* foreground_row(int y) { return foreground_.data() + offset(y); }
-  bool moves(size_t cell, const Comparison& frame) const;
+  uint8_t* level_row(int channel, int y) { return of_.level[channel].data() + shape_.offset(y); }
+  uint8_t* differing_row(int y) { return of_.differing.data() + shape_.offset(y); }
+  uint8_t* foreground_row(int y) { return of_.foreground.data() + shape_.offset(y); }
+  const DecisionConstants& constants() const { return steps_.constants; }
+  bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
+  template <typename Band>
+  void in_bands(int length, int bands, Band band);
+  void clear_marks();
+  void look(int parts);
   // Steps of a frame; threads have rows of their own.
-  void compare(const Comparison& frame, int first_row, int row_count);
-  void compare_means(const Comparison& frame, int first_row, int row_count);
-  void explain(const Comparison& frame, int grid_row);
-  void explain_span(const Comparison& frame, int y, int grid_row, int first, int last);
-  void look_at(const Comparison& frame, Run* run);
-  void look_around(const Comparison& frame, Run* run);
-  void leave_shadows(const Comparison& frame, const Run& run, int count);
-  void vote(int first_row, int row_count);
-  void learn(const Comparison& frame, int first_row, int row_count);
+  void compare(int first_row, int row_count);
+  void compare_means(int first_row, int row_count);
+  void explain(int grid_row);
+  void explain_run(int y, int left, int right, int grid_row);
+  void look_at(Run* run);
+  void look_around(Run* run);
+  void leave_shadows(const Run& run);
+  void learn(int first_row, int row_count);
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
 
-  int width_, height_, step_, margin_, reach_;
-  size_t stride_;
+  Shape shape_;
   DecisionSteps steps_;
   Shadows shadows_ = Shadows::background;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
@@ -114,17 +135,8 @@ class Decision {
   PixelNoise noise_;
   Specks specks_;
   int64_t frames_ = 0;
-  // Of the frame: means are compared, and what they must exceed.
-  bool noisy_ = false;
-  double threshold_ = 0;
-  // Of the frame: L, what differs from it, and what is foreground before and after the vote.
-  std::vector<uint8_t> level_[3], differing_, foreground_, mask_, shaded_;
+  Now now_;
+  Pictures of_;
 };
-
-// A pixel of a mask is overruled where three fifths of those at most so many rows and columns from
-// it are the other: 2, less in pictures whose short side is below 240 pixels, 0 (it decides alone)
-// below 120. Compression, and noise near the threshold, leave specks and holes of single pixels;
-// what is as narrow as they are goes with them.
-int voting_reach(int width, int height);
 
 }  // namespace qdmd

@@ -12,14 +12,9 @@ bool IgnoredAreas::add(const Rectangle& area) {
 }
 
 void IgnoredAreas::clear(int y, int left, int count, uint8_t* samples) const {
-  for (size_t i = 0; i < count_; ++i) {
-    const Rectangle& area = areas_[i];
-    // Corners may be anywhere: their sums need not be ints.
-    if (y < area.y || y >= int64_t{area.y} + area.height) continue;
-    const auto column = [&](int64_t x) { return std::clamp<int64_t>(x - left, 0, count); };
-    const int64_t first = column(area.x), end = column(int64_t{area.x} + area.width);
-    std::memset(samples + first, 0, static_cast<size_t>(end - first));
-  }
+  visit(y, left, count, [&](int64_t begin, int64_t end) {
+    std::memset(samples + begin, 0, static_cast<size_t>(end - begin));
+  });
 }
 
 void IgnoredAreas::clear_run(size_t first, size_t count, int width, uint8_t* samples) const {

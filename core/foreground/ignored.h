@@ -1,6 +1,7 @@
 // Where nothing is foreground, and masks learn nothing.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -23,6 +24,19 @@ class IgnoredAreas {
   size_t size() const { return count_; }
   const Rectangle& operator[](size_t i) const { return areas_[i]; }
 
+  // Calls visit(begin, end) for runs left + begin .. left + end - 1 of row y that are ignored, of
+  // columns left .. left + count - 1.
+  template <typename Visit>
+  void visit(int y, int left, int count, Visit visit) const {
+    for (size_t i = 0; i < count_; ++i) {
+      const Rectangle& area = areas_[i];
+      // Corners may be anywhere: their sums need not be ints.
+      if (y < area.y || y >= int64_t{area.y} + area.height) continue;
+      const auto column = [&](int64_t x) { return std::clamp<int64_t>(x - left, 0, count); };
+      const int64_t begin = column(area.x), end = column(int64_t{area.x} + area.width);
+      if (begin < end) visit(begin, end);
+    }
+  }
   // Sets to 0 what is ignored of `count` samples of row y, from column `left` on.
   void clear(int y, int left, int count, uint8_t* samples) const;
   // The same of samples first .. first + count - 1 of pictures that are `width` pixels wide.

@@ -1,31 +1,51 @@
 // How far each pixel is from the background while it is background.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "core/foreground/decision_steps.h"
+#include "core/passes/mean_distance.h"
+
 namespace qdmd {
 
-// A mean distance of each pixel, in 1/256 level, which follows the newest frames
-// (learn_distance()).
+// A mean distance of each pixel, in 1/256 level, which follows the newest frames. What is
+// foreground for a moment, and was not in the frame before, counts as well: lamps and blocks of
+// compressed video that come and go raise the mean until they are background, people come too
+// seldom for that.
 class PixelNoise {
  public:
   // Takes all memory. For pictures of width x height pixels.
-  PixelNoise(int width, int height)
-      : width_(static_cast<size_t>(width)), mean_(width_ * static_cast<size_t>(height)) {}
-  static uint64_t bytes(int width, int height) {
-    return sizeof(uint16_t) * static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
-  }
+  PixelNoise(int width, int height, const DecisionConstants& constants = {});
+  static uint64_t bytes(int width, int height);
 
-  void forget() { std::fill(mean_.begin(), mean_.end(), uint16_t{0}); }
+  // Begins afresh.
+  void forget();
   // Of a row of pixels.
   uint16_t* row(int y) { return mean_.data() + static_cast<size_t>(y) * width_; }
+  // One row in a few of a frame says enough, other rows of each frame.
+  bool learns_from(int y) const { return (y + frames_) % kRows == 0; }
+  // Before the next frame's mask takes the place of this one, width * height samples.
+  void remember(const uint8_t* mask);
+  // Of such a row, pixels left .. left + count - 1 of squared distance squared[p], with their own
+  // limits in levels: near[p] is 0 where they are background, and not next to foreground; now: the
+  // mask. Threads have rows of their own.
+  void learn(int y, size_t left, size_t count, const uint16_t* squared, const uint8_t* limit,
+             const uint8_t* near, const uint8_t* now);
+  // After the last row of a frame.
+  void end_frame() { ++frames_; }
 
  private:
+  static constexpr int kRows = 8;
+
   size_t width_;
+  int height_;
+  double most_samples_, weight_of_moments_;
+  NoiseRates rates_;
+  int64_t frames_ = 0;
   std::vector<uint16_t> mean_;
+  std::vector<uint8_t> before_;  // the rows that are learnt from, of the frame before
 };
 
 }  // namespace qdmd

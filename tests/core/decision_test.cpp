@@ -1,244 +1,11 @@
-// Masks: the passes behind them against their definitions, and what they make of light, of textures
-// that move, and of pictures in which there is little to see.
+// Masks: what they make of light, of textures that move, of lamps, and of pictures in which there
+// is little to see.
 #include "core/foreground/decision.h"
 
-#include "core/passes/distance.h"
-#include "core/passes/mean_distance.h"
-#include "core/passes/shading.h"
 #include "tests/core/engine_util.h"
-#include "tests/core/simd_targets.h"
 
 namespace qdmd::test {
 namespace {
-
-// ---- Passes ----
-
-// Rows of three channels with `margin` samples more on both sides, before an inaccessible page.
-struct Rows {
-  Rows(size_t rows, size_t count, size_t margin_, std::mt19937& rng) : margin(margin_) {
-    for (size_t i = 0; i < 3 * rows; ++i) {
-      memory.push_back(std::make_unique<BeforeTheEdge<uint8_t>>(count + 2 * margin));
-      for (uint8_t& sample : *memory.back()) sample = static_cast<uint8_t>(rng() % 256);
-      at.push_back(memory.back()->data() + margin);
-    }
-  }
-  size_t margin;
-  std::vector<std::unique_ptr<BeforeTheEdge<uint8_t>>> memory;
-  std::vector<uint8_t*> at;
-
-  const uint8_t* const* data() const { return const_cast<const uint8_t* const*>(at.data()); }
-};
-
-TEST(Distance, IsTheNearestOfThePixelsAround) {
-  std::mt19937 rng(320);
-  on_every_target([&] {
-    for (size_t count : {1u, 2u, 15u, 16u, 33u, 64u, 257u})
-      for (int step : {1, 4}) {
-        Rows x(1, count, 0, rng), l(kPlacesAlong, count, static_cast<size_t>(kPlaces * step), rng);
-        BeforeTheEdge<uint16_t> own(count), nearest(count);
-        const uint8_t* const middle[3] = {l.at[kPlaces], l.at[kPlacesAlong + kPlaces],
-                                          l.at[2 * kPlacesAlong + kPlaces]};
-        squared_distance(x.data(), middle, count, own.data());
-        nearest_distance(x.data(), l.data(), count, step, nearest.data());
-        for (int p = 0; p < static_cast<int>(count); ++p) {
-          int least = 65535;
-          for (int row = 0; row < kPlacesAlong; ++row)
-            for (int col = -kPlaces; col <= kPlaces; ++col) {
-              int sum = 0;
-              for (int c = 0; c < 3; ++c) {
-                const int d =
-                    x.at[size_t(c)][p] - l.at[size_t(c * kPlacesAlong + row)][p + col * step];
-                sum += d * d;
-              }
-              least = std::min(least, sum);
-              if (row == kPlaces && col == 0) {
-                ASSERT_EQ(own[size_t(p)], std::min(sum, 65535)) << p << " of " << count;
-              }
-            }
-          ASSERT_EQ(nearest[size_t(p)], least) << p << " of " << count;
-        }
-      }
-  });
-}
-
-TEST(Shading, FollowsItsDefinition) {
-  std::mt19937 rng(321);
-  size_t shaded = 0, others = 0;
-  on_every_target([&] {
-    for (size_t count : {1u, 2u, 7u, 16u, 27u, 28u})
-      for (const auto& black : {std::array<uint8_t, 3>{0, 0, 0}, {16, 128, 128}}) {
-        Rows l(kShadingAlong, count, kShadingReach, rng),
-            x(kShadingAlong, count, kShadingReach, rng);
-        // About the background in another light.
-        const double gain = 0.4 + 0.001 * static_cast<double>(rng() % 900);
-        for (size_t row = 0; row < l.at.size(); ++row)
-          for (size_t i = 0; i < count + 2 * kShadingReach; ++i) {
-            const int dark = black[row / kShadingAlong];
-            const double lit = dark + gain * (l.at[row][i - kShadingReach] - dark);
-            x.at[row][i - kShadingReach] = static_cast<uint8_t>(
-                std::clamp(lit + static_cast<double>(rng() % 9) - 4, 0.0, 255.0));
-          }
-        Rows differing(kShadingAlong, count, kShadingReach, rng);
-        for (auto& row : differing.memory)
-          for (uint8_t& sample : *row) sample = sample % 4 ? 255 : 0;
-        BeforeTheEdge<uint8_t> limit(count), out(count);
-        for (size_t p = 0; p < count; ++p) {
-          limit[p] = static_cast<uint8_t>(rng() % 3 ? 4 + rng() % 20 : rng() % 256);
-        }
-        find_shaded(x.data(), l.data(), black.data(), differing.data(), limit.data(), count,
-                    out.data());
-        for (int p = 0; p < static_cast<int>(count); ++p) {
-          // <x, L>, <L, L>, <x, x> of the pixel, and of those around.
-          double own[3] = {}, around[3] = {};
-          int pixels = 0;
-          for (int row = 0; row < kShadingAlong; ++row)
-            for (int col = -kShadingReach; col <= kShadingReach; ++col) {
-              const bool differs = differing.at[size_t(row)][p + col] != 0;
-              pixels += differs;
-              for (int c = 0; c < 3; ++c) {
-                const auto at = static_cast<size_t>(c * kShadingAlong + row);
-                const double a = x.at[at][p + col] - black[size_t(c)];
-                const double b = l.at[at][p + col] - black[size_t(c)];
-                const double products[3] = {a * b, b * b, a * a};
-                for (int k = 0; k < 3; ++k) {
-                  if (differs) around[k] += products[k];
-                  if (row == kShadingReach && col == 0) own[k] += products[k];
-                }
-              }
-            }
-          const auto rest = [](const double sums[3]) {
-            return sums[2] - sums[0] * sums[0] / sums[1];
-          };
-          const double a = own[0] / own[1];
-          const double most = std::max(3.0, 0.5 * limit[size_t(p)]);
-          const double texture = std::max(3.0, 0.75 * limit[size_t(p)]);
-          // What floats round away decides nothing here.
-          if (std::abs(rest(own) - most * most) < 0.05 || std::abs(a - 0.5) < 1e-5 ||
-              std::abs(rest(around) / pixels - texture * texture) < 0.05 ||
-              std::abs(a - 1.15) < 1e-5)
-            continue;
-          const bool expected = differing.at[kShadingReach][p] && own[1] > 0 && a >= 0.5 &&
-                                a <= 1.15 && rest(own) <= most * most &&
-                                rest(around) <= pixels * texture * texture;
-          ++(expected ? shaded : others);
-          ASSERT_EQ(out[size_t(p)], expected ? 255 : 0) << p << " of " << count;
-        }
-      }
-  });
-  EXPECT_GT(shaded, 50u);
-  EXPECT_GT(others, 50u);
-}
-
-TEST(Distance, OfMeansIsThatOfTheirPixels) {
-  std::mt19937 rng(330);
-  on_every_target([&] {
-    for (size_t count : {1u, 2u, 15u, 33u, 257u, 600u}) {
-      Rows x(3, count, 1, rng), l(3, count, 1, rng);
-      BeforeTheEdge<uint16_t> out(count);
-      smoothed_distance(x.data(), l.data(), count, out.data());
-      for (int p = 0; p < static_cast<int>(count); ++p) {
-        double squared = 0;
-        for (int c = 0; c < 3; ++c) {
-          int sum = 0;
-          for (int row = 0; row < 3; ++row)
-            for (int col = -1; col <= 1; ++col)
-              sum += x.at[size_t(3 * c + row)][p + col] - l.at[size_t(3 * c + row)][p + col];
-          squared += sum * sum / 81.0;
-        }
-        // Rounded to whole squared levels, from floats.
-        ASSERT_NEAR(out[size_t(p)], std::min(squared, 65535.0), 0.51) << p << " of " << count;
-      }
-    }
-  });
-}
-
-TEST(MeanDistance, IsLearntWhereItMayAndRaisesLimits) {
-  std::mt19937 rng(331);
-  on_every_target([&] {
-    for (size_t count : {1u, 2u, 15u, 33u, 257u})
-      for (float share : {1.0f, 0.125f, 0.02f}) {
-        BeforeTheEdge<uint16_t> squared(count), mean(count);
-        BeforeTheEdge<uint8_t> learns(count), limit(count);
-        for (size_t p = 0; p < count; ++p) {
-          squared[p] = static_cast<uint16_t>(rng() % 65536);
-          mean[p] = static_cast<uint16_t>(rng() % 25601);
-          learns[p] = rng() % 2 ? 255 : 0;
-          limit[p] = static_cast<uint8_t>(rng() % 256);
-        }
-        const std::vector<uint16_t> before(mean.begin(), mean.end());
-        learn_distance(squared.data(), learns.data(), count, share, mean.data());
-        for (size_t p = 0; p < count; ++p) {
-          const double distance = std::min<double>(std::sqrt(double(squared[p])), kMostDistance);
-          const double next = before[p] + double(share) * (256 * distance - before[p]);
-          if (learns[p]) {
-            // Rounded, from floats.
-            ASSERT_NEAR(mean[p], next, 0.51) << p;
-          } else {
-            ASSERT_EQ(mean[p], before[p]) << p;
-          }
-        }
-        const std::vector<uint8_t> limits(limit.begin(), limit.end());
-        raise_limit(mean.data(), 896, count, limit.data());
-        for (size_t p = 0; p < count; ++p)
-          ASSERT_EQ(limit[p], std::min(255, std::max<int>(limits[p], mean[p] * 896 / 65536))) << p;
-      }
-  });
-}
-
-TEST(Specks, AreCountedByFlooding) {
-  std::mt19937 rng(329);
-  for (auto [width, height] : {std::pair{1, 1}, {40, 30}, {300, 3}, {2, 200}, {97, 64}})
-    for (int share : {3, 50, 90})
-      for (bool diagonal : {false, true})
-        for (uint8_t colour : {uint8_t{255}, uint8_t{0}}) {
-          // Squares of 10 pixels, so that there are runs for every 16 pixels at most.
-          const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-          std::vector<uint8_t> mask(pixels), squares(10000);
-          for (uint8_t& square : squares) square = rng() % 100 < unsigned(share) ? 255 : 0;
-          for (int y = 0; y < height; ++y)
-            for (int x = 0; x < width; ++x)
-              mask[size_t(y * width + x)] = squares[size_t(y / 10 * 100 + x / 10)];
-          for (size_t least : {0u, 110u, 350u, 100000u}) {
-            auto expected = mask;
-            std::vector<uint8_t> seen(pixels);
-            for (size_t start = 0; start < pixels; ++start) {
-              if (seen[start] || mask[start] != colour) continue;
-              std::vector<size_t> part = {start};
-              seen[start] = 1;
-              for (size_t i = 0; i < part.size(); ++i)
-                for (int dy = -1; dy <= 1; ++dy)
-                  for (int dx = -1; dx <= 1; ++dx) {
-                    const int x = static_cast<int>(part[i]) % width + dx;
-                    const int y = static_cast<int>(part[i]) / width + dy;
-                    if ((dx != 0 && dy != 0 && !diagonal) || x < 0 || y < 0 || x >= width ||
-                        y >= height)
-                      continue;
-                    const auto at = static_cast<size_t>(y * width + x);
-                    if (seen[at] || mask[at] != colour) continue;
-                    seen[at] = 1;
-                    part.push_back(at);
-                  }
-              if (part.size() < least)
-                for (size_t at : part) expected[at] = static_cast<uint8_t>(~colour);
-            }
-            auto cleaned = mask;
-            Specks specks(width, height);
-            if (!specks.take_out(cleaned.data(), colour, least, diagonal)) {
-              EXPECT_LT(width, 20) << "rows of a few pixels have many runs";
-              continue;
-            }
-            ASSERT_EQ(cleaned, expected) << width << "x" << height << " " << share;
-          }
-        }
-}
-
-TEST(Specks, OfNoiseStay) {
-  std::vector<uint8_t> mask(100 * 100);
-  for (size_t p = 0; p < mask.size(); p += 2) mask[p] = 255;
-  auto same = mask;
-  EXPECT_FALSE(Specks(100, 100).take_out(same.data(), 255, 20, false));
-  EXPECT_EQ(same, mask);
-}
 
 // ---- Decisions ----
 
@@ -260,8 +27,9 @@ struct Planes {
 // What a model makes of one picture, for ever.
 BackgroundModel model_of(const Planes& background) {
   BackgroundModel model;
-  model.make_room(background.pixels(), false);
-  model.freeze_as(background.level, nullptr, background.pixels());
+  const std::vector<uint8_t> limits(background.pixels(), 12);
+  model.make_room(background.pixels(), true);
+  model.freeze_as(background.level, &limits, background.pixels());
   model.set_time(0);
   return model;
 }
@@ -271,12 +39,16 @@ struct Decided {
       : model(model_of(background)),
         decision(background.width, background.height, colours, steps) {}
   const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
-    decision.decide(
-        {{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()}, &model, 18}, pool);
+    decision.decide({{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
+                     &model,
+                     18,
+                     limits ? model.limits() : nullptr},
+                    pool);
     return decision.mask();
   }
   BackgroundModel model;
   Decision decision;
+  bool limits = true;  // of pixels
 };
 
 // A floor with a texture, in colours.
@@ -407,6 +179,124 @@ TEST(MovingTexture, IsNoForeground) {
     } else {
       EXPECT_GT(of_leaves, 0.05) << "they move";
     }
+  }
+}
+
+// The background's leaves, a little beside.
+Planes shifted(Planes& leaves, int right) {
+  Planes moved = leaves;
+  for (int y = 0; y < leaves.height; ++y)
+    for (int x = 0; x < right; ++x)
+      for (int c = 0; c < 3; ++c) moved.at(c, x, y) = leaves.at(c, x + 2, y + 1);
+  return moved;
+}
+
+TEST(MovingTexture, IsNobodyWhoStandsBesideHisPicture) {
+  std::mt19937 rng(333);
+  Planes leaves = leaves_of(320, 240, rng);
+  for (double restless : {DecisionConstants().restless, -1.0}) {
+    DecisionSteps steps;
+    steps.constants.restless = restless;
+    Decided decided(leaves, steps);
+    const Planes beside = shifted(leaves, 100);
+    size_t hits = 0;
+    for (int t = 0; t < 100; ++t) {
+      Planes frame = beside;
+      for (auto& plane : frame.level)
+        for (uint8_t& sample : plane) sample = static_cast<uint8_t>(sample + rng() % 5);
+      const uint8_t* mask = decided(frame);
+      if (t >= 50) hits += white(mask, frame.pixels());
+    }
+    // Explained by the background next to it, all the time.
+    const double found = static_cast<double>(hits) / (50.0 * 100 * 240);
+    if (restless > 0) {
+      EXPECT_GT(found, 0.2);
+    } else {
+      EXPECT_LT(found, 0.05);
+    }
+  }
+}
+
+TEST(MovingTexture, IsNoneOfAModelWithoutLimits) {
+  std::mt19937 rng(334);
+  Planes leaves = leaves_of(320, 240, rng);
+  // Nor learns their noise here.
+  Decided decided(leaves, {true, false, true, true, true, true});
+  decided.limits = false;
+  size_t hits = 0;
+  for (int t = 0; t < 60; ++t) {
+    const uint8_t* mask = decided(in_wind(leaves, 200, rng));
+    if (t >= 50) hits += white(mask, leaves.pixels());
+  }
+  EXPECT_GT(static_cast<double>(hits), 0.05 * 10 * 200 * 240);
+}
+
+TEST(MovingTexture, DoesNotHideWhatComesSuddenly) {
+  std::mt19937 rng(335);
+  Planes leaves = leaves_of(320, 240, rng);
+  for (double suddenly : {DecisionConstants().suddenly, 1e6}) {
+    DecisionSteps steps;
+    steps.constants.suddenly = suddenly;
+    // Pixels have a noise of their own, which hides more.
+    steps.noise = false;
+    Decided decided(leaves, steps);
+    size_t hits = 0;
+    for (int t = 0; t < 101; ++t) {
+      // A few of the leaves move; then all of them, which the second such frame knows.
+      Planes frame = leaves;
+      const Planes wind = t < 99 ? in_wind(leaves, 300, rng) : shifted(leaves, 300);
+      for (int top = 0; top < 240; top += 8)
+        for (int left = 0; left < 320; left += 8)
+          if (t >= 99 || rng() % 10 == 0)
+            for (int c = 0; c < 3; ++c)
+              for (int y = top; y < top + 8; ++y)
+                std::copy_n(&wind.level[c][static_cast<size_t>(y * 320 + left)], 8,
+                            &frame.at(c, left, y));
+      const uint8_t* mask = decided(frame);
+      if (t == 100) hits = white(mask, frame.pixels());
+    }
+    if (suddenly < 10) {
+      EXPECT_GT(hits, 0.2 * 300 * 240);
+    } else {
+      EXPECT_LT(hits, 0.1 * 300 * 240);
+    }
+  }
+}
+
+TEST(PixelNoise, LearnsWhatComesAndGoes) {
+  std::mt19937 rng(336);
+  const Planes floor = floor_of(320, 240, rng);
+  for (bool known : {true, false}) {
+    DecisionSteps steps;
+    if (!known) steps.constants.most_of_moments = 0;
+    Decided decided(floor, steps);
+    size_t of_lamp = 0, of_somebody = 0;
+    for (int t = 0; t < 600; ++t) {
+      Planes frame = floor;
+      // A lamp is on in two frames of five, somebody passes every 50 frames.
+      const bool on = rng() % 5 < 2;
+      const int left = 160 + 10 * (t % 50);
+      for (int c = 0; c < 3; ++c)
+        for (int y = 60; y < 120; ++y) {
+          for (int x = 40; on && x < 100; ++x) frame.at(c, x, y) += 25;
+          for (int x = left; x < left + 30 && x < 320; ++x)
+            frame.at(c, x, y) = static_cast<uint8_t>(c == 2 ? 200 : 40);
+        }
+      const uint8_t* mask = decided(frame);
+      if (t < 400) continue;
+      for (int y = 60; y < 120; ++y)
+        for (int x = 0; x < 320; ++x) {
+          const size_t hit = mask[y * 320 + x] == 255;
+          (x < 110 ? of_lamp : of_somebody) += hit;
+        }
+    }
+    const double all_of_lamp = 200 * 0.4 * 60 * 60, all_of_somebody = 200 / 50.0 * 15.5 * 30 * 60;
+    if (known) {
+      EXPECT_LT(static_cast<double>(of_lamp), 0.3 * all_of_lamp);
+    } else {
+      EXPECT_GT(static_cast<double>(of_lamp), 0.5 * all_of_lamp);
+    }
+    EXPECT_GT(static_cast<double>(of_somebody), 0.9 * all_of_somebody);
   }
 }
 

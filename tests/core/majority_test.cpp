@@ -1,6 +1,8 @@
 // The majority of a mask's pixels: against counting, and in the pictures that the engine writes.
 #include "core/passes/majority.h"
 
+#include "core/foreground/vote.h"
+
 #include "core/foreground/decision.h"
 #include "tests/core/engine_util.h"
 #include "tests/core/simd_targets.h"

@@ -1,7 +1,6 @@
 // What each step of a mask brings, beside OpenCV's masks: the measurement of docs/masks.md.
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -11,9 +10,9 @@
 #endif
 
 #include "core/engine/engine.h"
-#include "core/metrics/mask_scores.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"
+#include "tests/evaluation/mask_truth.h"
 
 namespace {
 
@@ -105,33 +104,11 @@ std::vector<Variant> variants() {
   return all;
 }
 
-// CDnet: frames and pixels outside of these do not count.
-struct Region {
-  cv::Mat inside;  // empty: all
-  size_t first = 1, last = SIZE_MAX;
-
-  explicit Region(const Sequence& sequence) {
-    const auto region = sequence.folder / "gt/ROI.bmp";
-    if (std::filesystem::exists(region)) inside = cv::imread(region.string(), cv::IMREAD_GRAYSCALE);
-    std::ifstream frames(sequence.folder / "gt/temporalROI.txt");
-    if (!(frames >> first >> last)) first = 1, last = SIZE_MAX;
-  }
-};
-
 double score(const Clip& clip, const Sequence& sequence, const Variant& variant) {
-  const Region region(sequence);
+  const MaskTruth truth(clip, sequence);
   MaskCounts counts;
   size_t frame = 0;
-  variant.run(clip, [&](const cv::Mat& mask) {
-    const size_t at = frame++;
-    uint64_t number = at + 1;
-    frame_number(sequence.frames[at], &number);
-    if (at >= clip.labels.size() || clip.labels[at].empty()) return;
-    if (number < region.first || number > region.last) return;
-    cv::Mat labels = clip.labels[at].clone();
-    if (!region.inside.empty()) labels.setTo(85, region.inside == 0);
-    counts.add(mask.data, labels.data, labels.total());
-  });
+  variant.run(clip, [&](const cv::Mat& mask) { truth.add(frame++, mask.data, &counts); });
   return counts.f_measure().value_or(1);
 }
 

@@ -448,11 +448,7 @@ void RobustLearner::end(BackgroundModel* model) {
     earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh_);
   model->set_gains(gains_of_frames());
   keep_some();
-  // A pixel alone is judged more strictly than with those around it.
-  uint8_t* limits = model->make_limits();
-  std::transform(
-      reference_.threshold.begin(), reference_.threshold.end(), limits,
-      [](int threshold) { return static_cast<uint8_t>(std::min(255, 3 * threshold / 2)); });
+  std::copy(reference_.threshold.begin(), reference_.threshold.end(), model->make_limits());
 }
 
 }  // namespace qdmd

@@ -1,0 +1,68 @@
+// The steps of a decision, and the constants that they go by. Users have no say in either:
+// docs/masks.md has what each step is worth, and what other constants would give.
+#pragma once
+
+#include "core/passes/shading.h"
+
+namespace qdmd {
+
+// Shares are of one, distances quaternion norms in levels.
+struct DecisionConstants {
+  // ---- PixelNoise ----
+  // Above so many mean distances a pixel is foreground. Of Gaussian noise, 3.5 are 5.6 sigma.
+  double mean_distances = 3.5;
+  // The newest of a pixel's distances counts at least one in so many; there is one for every eighth
+  // frame.
+  double noise_samples = 16;
+  // What comes for a moment counts so many times, because it is new in about half of the frames in
+  // which it is there; and at most so many of the pixel's limits.
+  double weight_of_moments = 2, most_of_moments = 3;
+  // Pixels at most so far from foreground, in pixels, say nothing of noise.
+  double near_foreground = 4;
+
+  // ---- Means in much noise ----
+  // Means of 3 x 3 pixels are compared where noise alone asks for a threshold above this. Their
+  // noise is a third: they must exceed a third of the threshold, and at least so much; the pixel
+  // itself must exceed a share of the threshold.
+  double noisy = 36, least_of_means = 18, least_alone = 0.5;
+
+  // ---- MovingTexture ----
+  // A pixel is explained where another one of the background is nearer than this share of its own
+  // distance.
+  double nearer = 0.3;
+  // Cells along the short side: objects of interest are about as large.
+  double texture_cells = 10;
+  // A cell moves above these: share of pixels that differ, shares of these that are explained and
+  // restless, least share of pixels that differ by their average share; and where the share of the
+  // last frame is below so many average ones.
+  double differing = 0.02, explained = 0.3, restless = 0.08, always = 0.5, suddenly = 2;
+  // Frames of averages, of recent shares, and in which the least share comes up to the recent one:
+  // something that came and stays is told from what was always there for about so long.
+  double average_frames = 100, recent_frames = 10, forget_frames = 1000;
+  // Frames in which nothing is known of a least share.
+  double first_frames = 25;
+  // Where a cell moves, a pixel must be further from what is around it than so many means of that.
+  // Leaves are further from what is around now and then.
+  double means_of_textures = 6;
+  // The newest distance counts at least one in so many there.
+  double texture_samples = 50;
+
+  // ---- Light ----
+  LightRange light;
+
+  // ---- Specks ----
+  // Parts of the mask below these shares of the picture are specks, and holes.
+  double least_foreground = 1 / 4000.0, least_hole = 1 / 500.0;
+};
+
+struct DecisionSteps {
+  bool smooth = true;   // means of 3 x 3 pixels where there is much noise
+  bool noise = true;    // PixelNoise
+  bool texture = true;  // MovingTexture
+  bool light = true;    // find_shaded
+  bool vote = true;
+  bool specks = true;  // Specks; only after a vote
+  DecisionConstants constants = {};
+};
+
+}  // namespace qdmd

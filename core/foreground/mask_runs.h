@@ -1,0 +1,50 @@
+// Loops over runs of a mask's samples, 255 or 0.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace qdmd {
+
+// Samples of a block that is looked at or left out as a whole.
+constexpr int kMaskBlock = 32;
+
+// Copies a mask of kMaskBlock samples, or fewer; whether any sample of it is set.
+inline bool copy_if_any(const uint8_t* mask, int count, uint8_t* out) {
+  if (count < kMaskBlock) {
+    std::memcpy(out, mask, static_cast<size_t>(count));
+    return std::memchr(mask, 255, static_cast<size_t>(count)) != nullptr;
+  }
+  uint64_t samples[kMaskBlock / 8], any = 0;
+  std::memcpy(samples, mask, kMaskBlock);
+  for (uint64_t eight : samples) any |= eight;
+  std::memcpy(out, samples, kMaskBlock);
+  return any != 0;
+}
+
+// Begins to bring samples near.
+template <typename T>
+void fetch(const T* from, int count) {
+  constexpr int kLine = 64 / sizeof(T);
+  for (int p = 0; p < count; p += kLine) __builtin_prefetch(from + p);
+}
+
+inline void either(const uint8_t* __restrict a, const uint8_t* __restrict b,
+                   const uint8_t* __restrict c, int count, uint8_t* __restrict out) {
+  for (int p = 0; p < count; ++p) out[p] = a[p] | b[p] | c[p];
+}
+
+// Whether the mask is set at a sample, or `wide` samples to the left or to the right of it.
+inline void widen(const uint8_t* __restrict mask, int count, int wide, uint8_t* __restrict out) {
+  for (int p = 0; p < count; ++p) out[p] = mask[p - wide] | mask[p] | mask[p + wide];
+}
+
+// Takes what is set in `what` out of the mask; where it was set, sets `taken`, or null.
+inline void take_out(const uint8_t* __restrict what, int count, uint8_t* __restrict mask,
+                     uint8_t* __restrict taken) {
+  if (taken)
+    for (int p = 0; p < count; ++p) taken[p] |= what[p] & mask[p];
+  for (int p = 0; p < count; ++p) mask[p] = static_cast<uint8_t>(mask[p] & ~what[p]);
+}
+
+}  // namespace qdmd
