@@ -1,6 +1,7 @@
 #include "gst/gstqdmdframes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <new>
 #include <utility>
@@ -157,6 +158,21 @@ static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
                              GST_OBJECT(self), make_solve_message(state->engine.report(), counters,
                                                                   GST_BASE_TRANSFORM(self)->segment,
                                                                   time.timestamp, time.duration)));
+}
+
+// Says that the frame of that time, or one a few frames before it, began another scene.
+static void tell_of_scene(GstQdmdBackground* self, GstClockTime timestamp) {
+  State* state = self->state;
+  const guint64 scenes = state->engine.scenes();
+  if (scenes > state->scenes_told) {
+    GST_INFO_OBJECT(self, "another scene: learning begins anew");
+    gst_element_post_message(
+        GST_ELEMENT(self),
+        gst_message_new_element(GST_OBJECT(self),
+                                make_scene_message(GST_BASE_TRANSFORM(self)->segment, timestamp)));
+  }
+  // An engine that is configured anew counts anew.
+  state->scenes_told = scenes;
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -420,6 +436,15 @@ static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, GstC
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
+// Of the frames as they come; 0: never.
+static gint64 absorb_frames(GstQdmdBackground* self, double seconds) {
+  if (seconds <= 0) return 0;
+  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
+  const double rate =
+      self->state->latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
+  return gint64(std::clamp(std::round(seconds * rate), 1.0, 1e12));
+}
+
 GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   State* state = self->state;
   // The base class asks for frames until there is none, or until downstream refuses one (it has
@@ -451,6 +476,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_threads(settings.engine.threads);
       engine.set_time_budget(settings.time_budget / 1000);
       engine.set_masks_expected(masks);
+      engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
       const Status status = engine.push(state->io.read(frame));
       note_solve(self, nullptr);
@@ -462,6 +488,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
     }
   }
   publish_report(self, 1, 0);
+  tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
   tell_of_solve(self, nullptr);
   follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;

@@ -52,8 +52,8 @@ struct State {
   BufferQueue shells;
   std::vector<guint8> mask, residual;  // for regions
   RegionFinder regions;
-  guint64 solves_told = 0;  // of the engine's
-  guint breaks = 0;         // in time, one after another, with a frame between them
+  guint64 solves_told = 0, scenes_told = 0;  // of the engine's
+  guint breaks = 0;  // in time, one after another, with a frame between them
   bool warned_of_breaks = false;
   guint warned = 0;                             // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected

@@ -51,6 +51,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       options.colours, options.steps);
   if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
+  background_->learner().set_absorb_frames(absorb_frames_);
   background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
@@ -151,6 +152,11 @@ void Engine::pass_wishes() {
 
 void Engine::set_threads(int threads) {
   if (workers_) workers_->ask_for(threads);
+}
+
+void Engine::set_absorb_frames(int64_t frames) {
+  absorb_frames_ = frames;
+  if (background_) background_->learner().set_absorb_frames(frames);
 }
 
 void Engine::set_shadows(Shadows shadows) {

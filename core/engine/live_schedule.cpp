@@ -31,17 +31,28 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     begin_window(has_model);
   }
   if (!frames().append(frame)) return false;
+  if (!frozen && sees_another_scene()) begin_scene();
   if (!frozen) begin_work();
   if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
-  if (background().state() == State::learnt && background().known())
-    background().mend(
-        SnapshotRange(frames().window()).newest(std::min(frames().size(), Learner::kMendingFrames)),
-        time());
-  if (background().solves() > solves) published_ = {time(), background().model().light()};
+  if (background().state() == State::learnt && background().known()) mend();
+  if (background().solves() > solves) published_ = {time(), background().model().light(time())};
   pace().count_frame();
   queue->pending = queue->ready = 1;
   return true;
+}
+
+// With the newest frame.
+void LiveSchedule::begin_scene() {
+  stop();
+  background().forget();
+  begin_window(false);
+}
+
+void LiveSchedule::mend() {
+  const int count = std::min(frames().size(), Learner::kMendingFrames);
+  background().mend({SnapshotRange(frames().window()).newest(count), count - 1,
+                     static_cast<int64_t>(frames().frames_taken()) - 1, time(), true});
 }
 
 // Publishes what is due.

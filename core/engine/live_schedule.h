@@ -45,6 +45,8 @@ class LiveSchedule : public Schedule {
     Gain light = kSameLight;
   };
 
+  void begin_scene();
+  void mend();
   void settle();
   void begin_work();
   void run(bool at_once);

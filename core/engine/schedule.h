@@ -44,6 +44,9 @@ class Schedule {
   void begin_push() { held_up_ = false; }
   // Work of a solve was done in the newest push(), or waited for.
   bool held_up() const { return held_up_; }
+  // How often frames showed another scene than the background (Learner::sees_another_scene), so
+  // that learning began anew.
+  uint64_t scenes() const { return scenes_; }
   // All that waits becomes ready. The next frame begins a new window.
   virtual void drain(Queue* queue) = 0;
   // Drops the work that is under way, and all frames. The background is forgotten, too.
@@ -74,12 +77,20 @@ class Schedule {
     if (!side().idle()) hold_up();
     side().finish();
   }
+  // Of the newest frame, which is taken in.
+  bool sees_another_scene() {
+    const bool other = background().known() && background().state() != Background::State::held &&
+                       background().learner().sees_another_scene(frames().window().newest_slot());
+    scenes_ += other ? 1 : 0;
+    return other;
+  }
   // For work of a solve that is done at once.
   void hold_up() { held_up_ = true; }
 
  private:
   Stage stage_;
   bool held_up_ = false;
+  uint64_t scenes_ = 0;
 };
 
 }  // namespace qdmd

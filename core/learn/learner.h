@@ -100,13 +100,32 @@ class Learner {
   // That model is now the one in use.
   virtual void publish() {}
 
-  // ---- What was uncovered ----
+  // ---- What was uncovered, and what stays ----
 
-  // Live, after each frame that is compared with the background in use, `model` at time t:
-  // `newest` are the newest frames, that one last. Where they show that something has left that
-  // `model` took for background, it has what was behind from now on.
-  static constexpr int kMendingFrames = 9;  // as many as there are, but no more than these
-  virtual void mend(const SnapshotRange& /*newest*/, double /*t*/, BackgroundModel* /*model*/) {}
+  // Before each frame is compared with the background in use, `model`. Where frames show that
+  // something has left that the model took for background (live), or that something which came
+  // stood still for the time to absorb, the model has what they show from now on.
+  static constexpr int kMendingFrames = 9;
+  struct Compared {
+    SnapshotRange around;  // the frame, and others that come next to it, kMendingFrames at most
+    int at = 0;            // which of them it is
+    int64_t number = 0;    // of that frame, counted like FrameStore::frames_taken()
+    double t = 0;          // the frame's time in the model
+    bool live = false;
+  };
+  virtual void mend(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
+  // Takes effect with the next frame. 0: never.
+  virtual void set_absorb_frames(int64_t) {}
+
+  // ---- Another scene ----
+
+  // Of each frame as it comes, in `slot`, once there is a background in use. True where the newest
+  // kSceneFrames show another scene than that; once, until there is a background of that scene.
+  virtual bool sees_another_scene(int /*slot*/) { return false; }
+  static constexpr int kSceneFrames = 8;
+  // Solves to come know nothing of what was before; the background in use stays. Not while one
+  // runs.
+  virtual void begin_scene() {}
 
   // ---- Light ----
 
