@@ -25,6 +25,20 @@ void Background::begin_scene() {
   scene_begins_ = true;
 }
 
+void Background::begin_scene_at_once() {
+  begin_scene();
+  known_ = false;
+  state_ = State::learnt;
+}
+
+void Background::return_to(const Learnt& learnt) {
+  begin_scene_at_once();
+  make_room();
+  recall(learnt);
+  show(learnt, State::held_in_light);
+  decision_.forget();
+}
+
 void Background::remember(Learnt* learnt) const {
   const BackgroundModel& model = models_[newest_];
   const size_t count = pixels();

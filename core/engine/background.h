@@ -39,6 +39,11 @@ class Background {
   void forget();
   // Learner::begin_scene(); masks begin anew with the next publish().
   void begin_scene();
+  // The same, and there is no background until then.
+  void begin_scene_at_once();
+  // The scene of what was learnt is back, and its background the one in use, in the light of each
+  // frame. Where it throws, nothing is known.
+  void return_to(const Learnt& learnt);
 
   // What is known, with the L of the time and light that the model is set to.
   void remember(Learnt* learnt) const;

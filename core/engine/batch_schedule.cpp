@@ -27,7 +27,7 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (!frames().append(frame)) return false;
   ++queue->pending;
   ++collection_->not_added;
-  if (!collection_->freeze && sees_another_scene())
+  if (!collection_->freeze && scene_seen() != SceneSeen::same)
     collection_->scene = std::max(collection_->begin, taken() - Learner::kSceneFrames);
   pace().count_frame();
   if (collected() == window_size_) {

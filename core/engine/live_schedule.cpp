@@ -31,7 +31,7 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     begin_window(has_model);
   }
   if (!frames().append(frame)) return false;
-  if (!frozen && sees_another_scene()) begin_scene();
+  if (!frozen) follow_scene();
   if (!frozen) begin_work();
   if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
@@ -42,11 +42,20 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   return true;
 }
 
-// With the newest frame.
-void LiveSchedule::begin_scene() {
+// With the newest frame: what was known of a scene is kept for its return.
+void LiveSchedule::follow_scene() {
+  const SceneSeen seen = scene_seen();
+  if (seen == SceneSeen::same) return;
   stop();
-  background().forget();
-  begin_window(false);
+  const bool returns = seen == SceneSeen::the_one_before && left_.has_value();
+  Learnt before;
+  background().remember(&before);
+  if (returns)
+    background().return_to(*left_);
+  else
+    background().begin_scene_at_once();
+  left_ = std::move(before);
+  begin_window(returns);
 }
 
 void LiveSchedule::mend() {
@@ -146,6 +155,7 @@ void LiveSchedule::begin_window(bool has_model) {
 
 void LiveSchedule::restart() {
   stop();
+  left_.reset();
   frames().clear();
   begin_window(false);
 }

@@ -44,7 +44,7 @@ class Schedule {
   void begin_push() { held_up_ = false; }
   // Work of a solve was done in the newest push(), or waited for.
   bool held_up() const { return held_up_; }
-  // How often frames showed another scene than the background (Learner::sees_another_scene), so
+  // How often frames showed another scene than the background (Learner::scene_of), so
   // that learning began anew.
   uint64_t scenes() const { return scenes_; }
   // All that waits becomes ready. The next frame begins a new window.
@@ -77,12 +77,13 @@ class Schedule {
     if (!side().idle()) hold_up();
     side().finish();
   }
-  // Of the newest frame, which is taken in.
-  bool sees_another_scene() {
-    const bool other = background().known() && background().state() != Background::State::held &&
-                       background().learner().sees_another_scene(frames().window().newest_slot());
-    scenes_ += other ? 1 : 0;
-    return other;
+  // With the newest frame, which is taken in.
+  SceneSeen scene_seen() {
+    if (!background().known() || background().state() == Background::State::held)
+      return SceneSeen::same;
+    const SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    scenes_ += seen == SceneSeen::same ? 0 : 1;
+    return seen;
   }
   // For work of a solve that is done at once.
   void hold_up() { held_up_ = true; }

@@ -34,6 +34,10 @@ enum class Models {
   two_of_live  // and the one in use outlives its window's frames: all its modes are pictures
 };
 
+// What a camera shows: the scene of the background, another one, or the one that it showed before
+// that.
+enum class SceneSeen { same, another, the_one_before };
+
 // Where a learner works.
 struct LearnerRoom {
   const FrameStore* frames;  // made for the learner's contents()
@@ -119,9 +123,10 @@ class Learner {
 
   // ---- Another scene ----
 
-  // Of each frame as it comes, in `slot`, once there is a background in use. True where the newest
-  // kSceneFrames show another scene than that; once, until there is a background of that scene.
-  virtual bool sees_another_scene(int /*slot*/) { return false; }
+  // What the newest kSceneFrames show, which came after one another, the last in `slot`: the scene
+  // of the background in use, or another one. What is not the same is said once, until there is a
+  // background of that scene.
+  virtual SceneSeen scene_of(int /*slot*/) { return SceneSeen::same; }
   static constexpr int kSceneFrames = 8;
   // Solves to come know nothing of what was before; the background in use stays. Not while one
   // runs.

@@ -120,6 +120,30 @@ TEST_P(AnotherScene, IsADarkOneToo) {
   for (size_t t = 190; t < 260; ++t) EXPECT_LT(mean_error(seen.backgrounds[t], street), 4) << t;
 }
 
+TEST_P(AnotherScene, ComesBackAsItWas) {
+  const auto one = view(9), two = view(10);
+  // Dusk falls meanwhile.
+  const auto clip = film(260, [&](int t, size_t i) {
+    return t >= 100 && t < 180 ? two[i] : one[i] * (t < 180 ? 1 : 0.8);
+  });
+  const Seen seen = run(clip, options());
+  EXPECT_EQ(seen.scenes.size(), 2u);
+  auto dusk = one;
+  for (uint8_t& level : dusk) level = static_cast<uint8_t>(std::lround(0.8 * level));
+  // The second frame knows it again; batch sees all of its window.
+  for (size_t t = 181; t < 260; ++t) EXPECT_LT(mean_error(seen.backgrounds[t], dusk), 2.5) << t;
+}
+
+TEST_P(AnotherScene, IsNotWhoeverStandsBeforeABareWall) {
+  const auto wall = [](size_t i) { return 120 + static_cast<double>(i % kWidth) / 8; };
+  const auto clip = film(160, [&](int t, size_t i) {
+    const int x = static_cast<int>(i % kWidth), y = static_cast<int>(i % kPixels) / kWidth;
+    const bool man = t >= 80 && x >= 40 && x < 90 && y >= 10;
+    return man ? 40 + 10 * (y % 9) : wall(i);
+  });
+  EXPECT_TRUE(run(clip, options()).scenes.empty());
+}
+
 TEST_P(AnotherScene, IsNoOtherLight) {
   const auto street = view(4);
   const auto colour = [](int t, size_t i) { return t < 100 ? 1 : i < kPixels ? 0.45 : 0.6; };
@@ -161,7 +185,7 @@ TEST(SceneWatch, OfTinyPicturesSaysNothing) {
   const float* const a[3] = {frames.plane(0, 0), frames.plane(0, 1), frames.plane(0, 2)};
   const float* const b[3] = {frames.plane(1, 0), frames.plane(1, 1), frames.plane(1, 2)};
   SceneWatch watch(grid);
-  for (int t = 0; t < 20; ++t) EXPECT_FALSE(watch.follow(a, b));
+  for (int t = 0; t < 20; ++t) EXPECT_EQ(watch.follow(a, b), SceneSeen::same);
 }
 
 }  // namespace

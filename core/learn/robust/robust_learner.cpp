@@ -89,6 +89,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
       StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
       static_cast<uint64_t>(window_size) * sizeof(Gain);
+  // Two scenes that were learnt: levels and limits, and the same once more for windows to come.
+  const uint64_t scenes = models == Models::two_of_live ? 2 * pixels() * (2 * kChannels + 2) : 0;
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
@@ -100,7 +102,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
-  return kept + made +
+  return kept + made + scenes +
          std::max({start, masks,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
                                        window_size),
@@ -157,19 +159,20 @@ void RobustLearner::publish() {
   published_ = 1 - published_;
   if (!std::exchange(scene_begins_, false)) return;
   looks_.forget();
-  scene_.forget();
   other_scene_ = false;
 }
 
-bool RobustLearner::sees_another_scene(int slot) {
-  static_assert(kSceneFrames == SceneWatch::kFrames);
-  if (other_scene_) return false;
+SceneSeen RobustLearner::scene_of(int slot) {
+  if (other_scene_) return SceneSeen::same;
   const GridFrames& cells = room_.frames->cells();
   const float* const frame[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  return other_scene_ = scene_.follow(frame, background);
+  const SceneSeen seen = scene_.follow(frame, background);
+  other_scene_ = seen != SceneSeen::same;
+  if (other_scene_) scene_.leave();
+  return seen;
 }
 
 void RobustLearner::begin_scene() {

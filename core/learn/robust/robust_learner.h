@@ -73,7 +73,7 @@ class RobustLearner : public Learner {
   void mend(const Compared& frame, BackgroundModel* model) override;
   void set_absorb_frames(int64_t frames) override { absorb_frames_ = frames; }
 
-  bool sees_another_scene(int slot) override;
+  SceneSeen scene_of(int slot) override;
   void begin_scene() override;
 
   bool follows_light() const override { return true; }
