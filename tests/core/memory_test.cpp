@@ -71,6 +71,15 @@ void paint(int t, Alpha alpha, Picture* picture) {
     }
 }
 
+// Another scene: bars, where there are columns else.
+void turn(Picture* picture) {
+  for (size_t p = 0; p < picture->pixels(); ++p) {
+    const size_t y = p / static_cast<size_t>(picture->width);
+    for (size_t c = 0; c < 3; ++c)
+      picture->at(c, p) = static_cast<uint8_t>(40 + 160 * (y / 8 % 2) + picture->at(c, p) / 16);
+  }
+}
+
 // From configure() to the end: two windows, a bit of a third, its end, most of another one, and
 // what else can be asked. Returns the bytes that the engine says it takes.
 double run(const Case& c) {
@@ -95,6 +104,8 @@ double run(const Case& c) {
   const auto stream = [&](int frames) {
     for (int t = 0; t < frames; ++t) {
       paint(t, c.alpha, &picture);
+      // Live keeps what it knew of a scene: at first the camera shows another one.
+      if (c.mode == Mode::live && frames > c.window && t < 4) turn(&picture);
       see([&] { status = engine.push(picture.in()); });
       EXPECT_TRUE(status.ok()) << status.message;
       pop();
@@ -142,9 +153,10 @@ void check(const Case& c) {
   if (asked_for("QDMD_SHOW_MEMORY"))
     std::printf("%-64s %11.0f %11.0f %6.3f\n", describe(c).c_str(), promised, peak, ratio);
   // The channels' modes may be complex, which takes four times the pictures of real ones.
-  // Live windows that fill up again are solved every hop, not just before they are full.
+  // Live windows that fill up again are solved every hop, not just before they are full; a scene
+  // that is back is kept twice for a moment, while no solve needs anything.
   const double least = c.method == Method::dmd                              ? 0.4
-                       : c.method == Method::robust && c.mode == Mode::live ? 0.95
+                       : c.method == Method::robust && c.mode == Mode::live ? 0.92
                                                                             : 0.98;
   EXPECT_LE(ratio, 1.02) << promised << " promised, " << peak << " taken";
   EXPECT_GE(ratio, least) << promised << " promised, " << peak << " taken";

@@ -89,8 +89,9 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
       StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
       static_cast<uint64_t>(window_size) * sizeof(Gain);
-  // Two scenes that were learnt: levels and limits, and the same once more for windows to come.
-  const uint64_t scenes = models == Models::two_of_live ? 2 * pixels() * (2 * kChannels + 2) : 0;
+  // A scene that was left: levels and limits, and the same once more for windows to come. Where it
+  // is back, there are two for a moment.
+  const uint64_t scene = models == Models::two_of_live ? pixels() * (2 * kChannels + 2) : 0;
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
@@ -102,8 +103,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
-  return kept + made + scenes +
-         std::max({start, masks,
+  return kept + made + scene +
+         std::max({start, masks, scene,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
                                        window_size),
                    filling});
