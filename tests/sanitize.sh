@@ -74,5 +74,5 @@ slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
 flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
 short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread}_test.cpp
 short address,undefined kernels core/gram/{tile_kernel,kernel,gram,window}.cpp \
-  core/passes/{combine,median_rows,planes,residual}.cpp core/parallel/pool.cpp \
+  core/passes/{chroma,combine,median_rows,planes,residual}.cpp core/parallel/pool.cpp \
   tests/core/{gram,kernel,passes,combine}_test.cpp

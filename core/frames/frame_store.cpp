@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "core/passes/chroma.h"
 #include "core/passes/planes.h"
 #include "core/passes/sampling.h"
 
@@ -78,10 +79,10 @@ bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
     alpha_ = std::make_unique_for_overwrite<uint8_t[]>(alpha_bytes());
   }
   uint8_t* to = alpha_of(slot);
-  for (int row = 0; row < height_; ++row) {
-    const uint8_t* from = frame.alpha + row * frame.row_stride;
-    for (int col = 0; col < width_; ++col, from += frame.pixel_stride) *to++ = *from;
-  }
+  const Spacing at = frame.spacing(3);
+  for (int row = 0; row < height_; ++row, to += width_)
+    spread_samples(frame.alpha + row * at.row_stride, at.pixel_stride, 1,
+                   static_cast<size_t>(width_), to);
   return true;
 }
 
