@@ -22,8 +22,9 @@ inline Levels levels_of(const GstVideoInfo& info) {
   gst_video_color_range_offsets(range, info.finfo, offset, scale);
   Levels levels;
   for (int c = 0; c < 3; ++c) {
-    levels.black[c] = static_cast<uint8_t>(offset[c]);
-    levels.white[c] = static_cast<uint8_t>(yuv && c > 0 ? offset[c] : offset[c] + scale[c]);
+    const int from = GST_VIDEO_INFO_IS_GRAY(&info) ? 0 : c;
+    levels.black[c] = static_cast<uint8_t>(offset[from]);
+    levels.white[c] = static_cast<uint8_t>(offset[from] + (yuv && c > 0 ? 0 : scale[from]));
   }
   return levels;
 }

@@ -21,12 +21,12 @@ class Shape {
  public:
   explicit Shape(const MutableImageView& out) : out_(out) {
     for (int c = 0; c < 3; ++c) at_[c] = out.spacing(c);
-    channels_ = out.channel[1] == out.channel[0] && out.channel[2] == out.channel[0] ? 1 : 3;
+    is_grey_ = out.channel[1] == out.channel[0] && out.channel[2] == out.channel[0];
     if (out.is_even() && out.pixel_stride > 1) {
       kind_ = Kind::pixels;
       return;
     }
-    const bool alike = channels_ == 3 && at_[1].pixel_stride == at_[2].pixel_stride &&
+    const bool alike = !is_grey_ && at_[1].pixel_stride == at_[2].pixel_stride &&
                        at_[1].row_stride == at_[2].row_stride && at_[1].columns == at_[2].columns &&
                        at_[1].rows == at_[2].rows;
     const ptrdiff_t apart = alike ? out.channel[2] - out.channel[1] : 0;
@@ -49,8 +49,8 @@ class Shape {
     pairs         // two samples of channel 0 between those of channels 1 and 2
   };
   Kind kind() const { return kind_; }
-  // 1: grey.
-  int channels() const { return channels_; }
+  // Of grey the last of three channels at one place is written, as if each were.
+  bool has(int c) const { return c == 2 || !is_grey_; }
   // Of channels 1 and 2 the one that lies first.
   int first() const { return first_; }
   // Of pairs.
@@ -59,7 +59,7 @@ class Shape {
   bool is_shared(int c) const { return at_[c].columns > 1 || at_[c].rows > 1; }
   // A channel whose samples can be made where they belong.
   bool is_direct(int c) const {
-    return c < channels_ && (kind_ == Kind::planes || (kind_ == Kind::half_planar && c == 0)) &&
+    return has(c) && (kind_ == Kind::planes || (kind_ == Kind::half_planar && c == 0)) &&
            at_[c].pixel_stride == 1;
   }
   uint8_t* sample(int c, int y, size_t x) const {
@@ -71,8 +71,8 @@ class Shape {
   const MutableImageView& out_;
   Spacing at_[3];
   Kind kind_ = Kind::planes;
-  int channels_ = 3, first_ = 1;
-  bool luma_first_ = true;
+  int first_ = 1;
+  bool is_grey_ = false, luma_first_ = true;
 };
 
 // Pixels of one or two rows that share samples.
@@ -92,7 +92,7 @@ class Writer {
         has_alpha_(out.alpha && !out.alpha_is_padding) {
     const bool greys = task.output == Output::mask || task.output == Output::foreground;
     for (int c = 0; c < 3; ++c)
-      is_constant_[c] = c >= shape_.channels() || (greys && levels.black[c] == levels.white[c]);
+      is_constant_[c] = !shape_.has(c) || (greys && levels.black[c] == levels.white[c]);
   }
 
   void write(const Block& block) {
@@ -122,8 +122,8 @@ class Writer {
   void make_row(int r, size_t first, size_t count) {
     uint8_t* const* const to = rows_[r];
     const uint8_t* const mask = task_.mask ? task_.mask + first : nullptr;
-    for (int c = 0; c < shape_.channels(); ++c)
-      if (is_constant_[c]) std::memset(to[c], levels_.black[c], count);
+    for (int c = 0; c < 3; ++c)
+      if (shape_.has(c) && is_constant_[c]) std::memset(to[c], levels_.black[c], count);
     switch (task_.output) {
       case Output::background:
         task_.model->evaluate(first, count, to);
@@ -156,8 +156,8 @@ class Writer {
           for (size_t p = 0; p < count; ++p) room_.grey[p] = mask[p] ? 255 : 0;
           shown = room_.grey;
         }
-        for (int c = 0; c < shape_.channels(); ++c)
-          fade(task_.x[c] + first, shown, levels_.black[c], count, to[c]);
+        for (int c = 0; c < 3; ++c)
+          if (shape_.has(c)) fade(task_.x[c] + first, shown, levels_.black[c], count, to[c]);
         break;
       }
     }
@@ -224,8 +224,8 @@ class Writer {
         for (int r = 0; r < block.rows; ++r) put_pairs(r, block);
         break;
       default:
-        for (int c = 0; c < shape_.channels(); ++c)
-          for (int r = 0; r < block.rows; r += shape_.at(c).rows) {
+        for (int c = 0; c < 3; ++c)
+          for (int r = 0; shape_.has(c) && r < block.rows; r += shape_.at(c).rows) {
             const uint8_t* samples = samples_of(c, r, block);
             uint8_t* to = shape_.sample(c, block.y + r, block.left);
             if (samples != to) put(samples, width_of(c, block), to, shape_.at(c).pixel_stride);

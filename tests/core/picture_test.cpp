@@ -147,7 +147,7 @@ void expect_picture(Scene& scene, const VideoLayout& layout, const Asked& asked,
 
   const bool grey = std::string(layout.name) == "GRAY";
   for (int c = 0; c < 4; ++c) {
-    if (!out.has(c) || (grey && c > 0)) continue;
+    if (!out.has(c) || (grey && c != 2)) continue;
     const ChannelAt& at = out.layout_of(c);
     for (int top = 0; top < scene.height; top += at.rows)
       for (int left = 0; left < scene.width; left += at.columns) {
