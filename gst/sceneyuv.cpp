@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gst/videoview.h"
+
 namespace qdmd {
 namespace {
 
@@ -63,8 +65,7 @@ void SceneYuv::write(GstVideoFrame* frame, const std::function<const uint8_t*(in
         const uint8_t* from = row(y);
         for (size_t i = 0; i < sums_.size(); ++i) sums_[i] += from[i];
       }
-      auto* to = static_cast<uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(frame, c)) +
-                 top / rows * GST_VIDEO_FRAME_COMP_STRIDE(frame, c);
+      uint8_t* to = component_data(*frame, c) + top / rows * GST_VIDEO_FRAME_COMP_STRIDE(frame, c);
       for (int left = 0; left < width; left += columns) {
         const int right = std::min(left + columns, width);
         int64_t r = 0, g = 0, b = 0;

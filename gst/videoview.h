@@ -29,6 +29,15 @@ inline Levels levels_of(const GstVideoInfo& info) {
   return levels;
 }
 
+// The first sample of a component. GStreamer 1.22 has V of P010 one byte behind U, which is in the
+// middle of it.
+inline guint8* component_data(const GstVideoFrame& frame, int component) {
+  const int offset = GST_VIDEO_FRAME_COMP_POFFSET(&frame, component);
+  const bool wide = GST_VIDEO_FRAME_COMP_DEPTH(&frame, component) > 8;
+  return static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&frame, component)) +
+         (wide && offset % 2 == 1 ? offset : 0);
+}
+
 // Maps a buffer for as long as it lives. The map is released before the buffer is handed on.
 class MappedVideoFrame {
  public:
@@ -59,7 +68,7 @@ class MappedVideoFrame {
     Spacing first;
     for (int c = 0; c < 3 + alpha; ++c) {
       const int component = std::min(c, components - 1);
-      Byte* const data = static_cast<Byte*>(GST_VIDEO_FRAME_COMP_DATA(&frame_, component));
+      Byte* const data = component_data(frame_, component);
       (c < 3 ? view.channel[c] : view.alpha) = data;
       const auto* format = frame_.info.finfo;
       view.own[c] = {GST_VIDEO_FRAME_COMP_PSTRIDE(&frame_, component),

@@ -30,11 +30,14 @@ using Frames = std::vector<Frame>;
 void unpack_components(GstBuffer* buffer, GstVideoFrame* frame, Frame* result) {
   for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(frame); ++c) {
     std::vector<int> samples;
+    // V is two bytes behind U, and not one, as GStreamer 1.22 has it.
+    const bool wrong = GST_VIDEO_FRAME_FORMAT(frame) == GST_VIDEO_FORMAT_P010_10LE &&
+                       GST_VIDEO_FRAME_COMP_POFFSET(frame, c) == 1;
     for (int y = 0; y < GST_VIDEO_FRAME_COMP_HEIGHT(frame, c); ++y)
       for (int x = 0; x < GST_VIDEO_FRAME_COMP_WIDTH(frame, c); ++x) {
         const auto* from = static_cast<const uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(frame, c)) +
                            y * GST_VIDEO_FRAME_COMP_STRIDE(frame, c) +
-                           x * GST_VIDEO_FRAME_COMP_PSTRIDE(frame, c);
+                           x * GST_VIDEO_FRAME_COMP_PSTRIDE(frame, c) + wrong;
         const bool deep = GST_VIDEO_FRAME_COMP_DEPTH(frame, c) > 8;
         samples.push_back((deep ? GST_READ_UINT16_LE(from) : *from) >>
                           GST_VIDEO_FORMAT_INFO_SHIFT(frame->info.finfo, c));
