@@ -38,11 +38,13 @@ size_t sums_size(int capacity) {
 
 }  // namespace
 
-uint64_t SlidingGram::bytes(int capacity, int threads, bool shared) {
+uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape) {
   const auto cols = static_cast<uint64_t>(kChannels * capacity);
   const uint64_t of_thread =
       sums_size(capacity) * sizeof(int64_t) +
-      (shared ? SharedChromaProducts::bytes(std::min(kRowSnapshots, capacity), capacity) : 0);
+      (shape.is_shared()
+           ? SharedChromaProducts::bytes(shape, std::min(kRowSnapshots, capacity), capacity)
+           : 0);
   return cols * cols * sizeof(int64_t) + cols * sizeof(uint8_t*) +
          of_thread * static_cast<uint64_t>(threads);
 }

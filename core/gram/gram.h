@@ -29,8 +29,8 @@ class SlidingGram {
   // Of frames whose chroma has shared samples: for add_rows().
   SlidingGram(int capacity, const ChromaShape& shape, Pool* pool = nullptr,
               const Kernel& kernel = kernels().front());
-  // What SlidingGram(capacity) takes with a pool of so many threads; shared: the other one.
-  static uint64_t bytes(int capacity, int threads, bool shared = false);
+  // What SlidingGram(capacity, shape) takes with a pool of so many threads.
+  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {});
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read

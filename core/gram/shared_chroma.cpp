@@ -7,12 +7,20 @@
 namespace qdmd {
 namespace {
 
-// Chroma samples whose digits of luma are made at once: those of all snapshots stay in the
-// second-level cache.
+// Chroma samples that are worked on at once, in whole rows: all that belongs to them, of all
+// snapshots, stays in the second-level cache.
 constexpr size_t kRun = 1024;
 
 size_t most_products(int rows, int cols) {
   return 4 * static_cast<size_t>(rows) * static_cast<size_t>(cols);
+}
+
+std::unique_ptr<int64_t[]> make_products(int rows, int cols) {
+  return std::make_unique_for_overwrite<int64_t[]>(most_products(rows, cols));
+}
+
+size_t run_of(const ChromaShape& shape) {
+  return std::max(kRun, static_cast<size_t>(shape.chroma_width()));
 }
 
 }  // namespace
@@ -41,24 +49,26 @@ SharedChromaProducts::SharedChromaProducts(const ChromaShape& shape, const Kerne
                                            int cols)
     : shape_(shape),
       kernel_(kernel),
-      products_(std::make_unique_for_overwrite<int64_t[]>(most_products(rows, cols))),
-      mixed_(std::make_unique_for_overwrite<int64_t[]>(most_products(rows, cols))),
-      mirrored_(std::make_unique_for_overwrite<int64_t[]>(most_products(rows, cols))),
-      digits_(std::make_unique_for_overwrite<uint8_t[]>(2 * kRun * static_cast<size_t>(cols))) {
+      run_(run_of(shape)),
+      luma_products_(make_products(rows, cols)),
+      chroma_products_(make_products(rows, cols)),
+      mixed_(make_products(rows, cols)),
+      mirrored_(make_products(rows, cols)),
+      digits_(std::make_unique_for_overwrite<uint8_t[]>(2 * run_ * static_cast<size_t>(cols))) {
   const auto snapshots = static_cast<size_t>(cols);
   luma_.reserve(snapshots);
   chroma_.reserve(2 * snapshots);
-  run_.reserve(2 * snapshots);
+  here_.reserve(2 * snapshots);
   for (size_t plane = 0; plane < 2 * snapshots; ++plane)
-    digit_planes_.push_back(digits_.get() + plane * kRun);
+    digit_planes_.push_back(digits_.get() + plane * run_);
 }
 
-uint64_t SharedChromaProducts::bytes(int rows, int cols) {
-  return 3 * most_products(rows, cols) * sizeof(int64_t) +
-         static_cast<uint64_t>(cols) * (2 * kRun + 7 * sizeof(uint8_t*));
+uint64_t SharedChromaProducts::bytes(const ChromaShape& shape, int rows, int cols) {
+  return 4 * most_products(rows, cols) * sizeof(int64_t) +
+         static_cast<uint64_t>(cols) * (2 * run_of(shape) + 7 * sizeof(uint8_t*));
 }
 
-void SharedChromaProducts::clear(const Part& part, const Products& products) const {
+void SharedChromaProducts::clear(const Part& part, const Products& products) {
   std::fill_n(products.get(), 4 * part.rows * part.cols, int64_t{0});
 }
 
@@ -72,25 +82,48 @@ void SharedChromaProducts::add(const uint8_t* const* planes, int rows, int cols,
     chroma_.push_back(planes[kChannels * j + 1]);
     chroma_.push_back(planes[kChannels * j + 2]);
   }
-  const auto one = [](size_t, size_t) { return int64_t{1}; };
-  const auto width = static_cast<size_t>(shape_.width);
-  const int top = first * shape_.rows,
-            bottom = std::min((first + count) * shape_.rows, shape_.height);
-  clear(part, products_);
-  kernel_.add_dot_products(luma_.data() + part.cols - part.rows, part.rows, luma_.data(), part.cols,
-                           static_cast<size_t>(top) * width,
-                           static_cast<size_t>(bottom - top) * width, products_.get());
-  part.scatter(products_.get(), 1, 1, 0, 0, sums, one);
-
-  const auto samples = static_cast<size_t>(shape_.chroma_width());
-  clear(part, products_);
-  kernel_.add_dot_products(chroma_.data() + 2 * (part.cols - part.rows), 2 * part.rows,
-                           chroma_.data(), 2 * part.cols, static_cast<size_t>(first) * samples,
-                           static_cast<size_t>(count) * samples, products_.get());
-  const int64_t whole = shape_.columns * shape_.rows;
-  part.scatter(products_.get(), 2, 2, 1, 1, sums, [=](size_t, size_t) { return whole; });
+  for (const Products* products : {&luma_products_, &chroma_products_, &mixed_, &mirrored_})
+    clear(part, *products);
+  const int step = static_cast<int>(run_) / shape_.chroma_width();
+  for (int row = first; row < first + count; row += step)
+    multiply(part, row, std::min(step, first + count - row));
+  part.scatter(luma_products_.get(), 1, 1, 0, 0, sums, [](size_t, size_t) { return 1; });
+  const int whole = shape_.columns * shape_.rows;
+  part.scatter(chroma_products_.get(), 2, 2, 1, 1, sums, [=](size_t, size_t) { return whole; });
+  // Of the high digit and the low one.
+  part.scatter(mixed_.get(), 2, 2, 1, 0, sums,
+               [](size_t, size_t digit) { return digit == 0 ? 4 : 1; });
+  part.scatter(mirrored_.get(), 2, 2, 0, 1, sums,
+               [](size_t digit, size_t) { return digit == 0 ? 4 : 1; });
   add_edges(part, sums);
-  add_mixed(part, sums);
+}
+
+// All products of some rows of chroma.
+void SharedChromaProducts::multiply(const Part& part, int first, int count) {
+  const size_t width = static_cast<size_t>(shape_.width),
+               samples = static_cast<size_t>(shape_.chroma_width());
+  const int top = first * shape_.rows, bottom = std::min(top + count * shape_.rows, shape_.height);
+  const size_t others = part.cols - part.rows, length = static_cast<size_t>(count) * samples;
+  kernel_.add_dot_products(luma_.data() + others, part.rows, luma_.data(), part.cols,
+                           static_cast<size_t>(top) * width,
+                           static_cast<size_t>(bottom - top) * width, luma_products_.get());
+  here_.clear();
+  for (const uint8_t* plane : chroma_)
+    here_.push_back(plane + static_cast<size_t>(first) * samples);
+  kernel_.add_dot_products(here_.data() + 2 * others, 2 * part.rows, here_.data(), 2 * part.cols, 0,
+                           length, chroma_products_.get());
+  for (size_t j = 0; j < part.cols; ++j)
+    for (int y = top; y < bottom; y += shape_.rows) {
+      const uint8_t* above = luma_[j] + static_cast<size_t>(y) * width;
+      const bool two = shape_.rows == 2 && y + 1 < shape_.height;
+      const size_t at = static_cast<size_t>((y - top) / shape_.rows) * samples;
+      block_sums(above, two ? above + width : nullptr, width, digits_.get() + 2 * j * run_ + at,
+                 digits_.get() + (2 * j + 1) * run_ + at);
+    }
+  kernel_.add_dot_products(here_.data() + 2 * others, 2 * part.rows, digit_planes_.data(),
+                           2 * part.cols, 0, length, mixed_.get());
+  kernel_.add_dot_products(digit_planes_.data() + 2 * others, 2 * part.rows, here_.data(),
+                           2 * part.cols, 0, length, mirrored_.get());
 }
 
 // Takes off what fewer pixels share at the last column and row of odd sizes.
@@ -100,23 +133,23 @@ void SharedChromaProducts::add_edges(const Part& part, int64_t* sums) {
   const bool odd_row =
       shape_.height % shape_.rows != 0 && part.first + part.count == shape_.chroma_height();
   const auto scatter = [&](int64_t weight) {
-    part.scatter(products_.get(), 2, 2, 1, 1, sums, [=](size_t, size_t) { return weight; });
+    part.scatter(chroma_products_.get(), 2, 2, 1, 1, sums, [=](size_t, size_t) { return weight; });
   };
   // The samples of a column, side by side.
   const auto add_column = [&](int first, int count) {
     for (size_t plane = 0; plane < 2 * part.cols; ++plane) {
-      uint8_t* to = digits_.get() + plane * kRun;
+      uint8_t* to = digits_.get() + plane * run_;
       for (int row = first; row < first + count; ++row)
         *to++ = chroma_[plane][static_cast<size_t>(row + 1) * samples - 1];
     }
     kernel_.add_dot_products(digit_planes_.data() + 2 * (part.cols - part.rows), 2 * part.rows,
                              digit_planes_.data(), 2 * part.cols, 0, static_cast<size_t>(count),
-                             products_.get());
+                             chroma_products_.get());
   };
   if (odd_width) {
-    clear(part, products_);
+    clear(part, chroma_products_);
     for (int row = part.first, end = part.first + part.count; row < end;) {
-      const int count = std::min(end - row, static_cast<int>(kRun));
+      const int count = std::min(end - row, static_cast<int>(run_));
       add_column(row, count);
       row += count;
     }
@@ -124,59 +157,16 @@ void SharedChromaProducts::add_edges(const Part& part, int64_t* sums) {
   }
   if (!odd_row) return;
   const int last = shape_.chroma_height() - 1;
-  clear(part, products_);
+  clear(part, chroma_products_);
   kernel_.add_dot_products(chroma_.data() + 2 * (part.cols - part.rows), 2 * part.rows,
                            chroma_.data(), 2 * part.cols, static_cast<size_t>(last) * samples,
-                           samples, products_.get());
+                           samples, chroma_products_.get());
   scatter(-shape_.columns);
   if (!odd_width) return;
   // Both were taken off the corner, which is one pixel's.
-  clear(part, products_);
+  clear(part, chroma_products_);
   add_column(last, 1);
   scatter(1 - shape_.columns * shape_.rows + shape_.columns + shape_.rows);
-}
-
-// The digits of chroma samples first .. first + count - 1.
-void SharedChromaProducts::digits_of(const uint8_t* luma, size_t first, size_t count, uint8_t* high,
-                                     uint8_t* low) const {
-  const auto samples = static_cast<size_t>(shape_.chroma_width());
-  const auto width = static_cast<size_t>(shape_.width);
-  while (count > 0) {
-    const size_t row = first / samples, left = first % samples;
-    const size_t part = std::min(count, samples - left);
-    const size_t y = row * static_cast<size_t>(shape_.rows);
-    const uint8_t* above = luma + y * width + 2 * left;
-    const bool two = shape_.rows == 2 && y + 1 < static_cast<size_t>(shape_.height);
-    block_sums(above, two ? above + width : nullptr, std::min(2 * part, width - 2 * left), high,
-               low);
-    first += part, count -= part, high += part, low += part;
-  }
-}
-
-void SharedChromaProducts::add_mixed(const Part& part, int64_t* sums) {
-  clear(part, mixed_);
-  clear(part, mirrored_);
-  const auto samples = static_cast<size_t>(shape_.chroma_width());
-  const size_t begin = static_cast<size_t>(part.first) * samples;
-  const size_t end = begin + static_cast<size_t>(part.count) * samples;
-  const size_t others = 2 * (part.cols - part.rows);
-  for (size_t first = begin; first < end; first += kRun) {
-    const size_t count = std::min(kRun, end - first);
-    run_.clear();
-    for (const uint8_t* plane : chroma_) run_.push_back(plane + first);
-    for (size_t j = 0; j < part.cols; ++j)
-      digits_of(luma_[j], first, count, digits_.get() + 2 * j * kRun,
-                digits_.get() + (2 * j + 1) * kRun);
-    kernel_.add_dot_products(run_.data() + others, 2 * part.rows, digit_planes_.data(),
-                             2 * part.cols, 0, count, mixed_.get());
-    kernel_.add_dot_products(digit_planes_.data() + others, 2 * part.rows, run_.data(),
-                             2 * part.cols, 0, count, mirrored_.get());
-  }
-  // Of the high digit and the low one.
-  part.scatter(mixed_.get(), 2, 2, 1, 0, sums,
-               [](size_t, size_t digit) { return digit == 0 ? int64_t{4} : int64_t{1}; });
-  part.scatter(mirrored_.get(), 2, 2, 0, 1, sums,
-               [](size_t digit, size_t) { return digit == 0 ? int64_t{4} : int64_t{1}; });
 }
 
 }  // namespace qdmd

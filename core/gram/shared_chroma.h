@@ -20,7 +20,7 @@ class SharedChromaProducts {
  public:
   // For up to `rows` snapshots with up to `cols` of them.
   SharedChromaProducts(const ChromaShape& shape, const Kernel& kernel, int rows, int cols);
-  static uint64_t bytes(int rows, int cols);
+  static uint64_t bytes(const ChromaShape& shape, int rows, int cols);
 
   // Adds what the pixels of chroma rows first .. first + count - 1 contribute to the inner products
   // of the last `rows` of `cols` snapshots with all of them: sums[(3 j + d) 3 rows + 3 i + c] of
@@ -31,17 +31,17 @@ class SharedChromaProducts {
   struct Part;
   using Products = std::unique_ptr<int64_t[]>;
 
+  void multiply(const Part& part, int first, int count);
   void add_edges(const Part& part, int64_t* sums);
-  void add_mixed(const Part& part, int64_t* sums);
-  void digits_of(const uint8_t* luma, size_t first, size_t count, uint8_t* high,
-                 uint8_t* low) const;
-  void clear(const Part& part, const Products& products) const;
+  static void clear(const Part& part, const Products& products);
 
   ChromaShape shape_;
   Kernel kernel_;
-  Products products_, mixed_, mirrored_;
+  size_t run_;  // chroma samples that are worked on at once, at most
+  // Of luma, of chroma, and of chroma with the digits of luma both ways round.
+  Products luma_products_, chroma_products_, mixed_, mirrored_;
   std::unique_ptr<uint8_t[]> digits_;
-  std::vector<const uint8_t*> luma_, chroma_, run_, digit_planes_;
+  std::vector<const uint8_t*> luma_, chroma_, here_, digit_planes_;
 };
 
 }  // namespace qdmd
