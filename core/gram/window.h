@@ -35,7 +35,9 @@ class PlaneSlots {
   PlaneSlots(int capacity, size_t pixels) : PlaneSlots(capacity, pixels, pixels) {}
   // Channels 1 and 2 have their shared samples only.
   PlaneSlots(int capacity, const ChromaShape& shape)
-      : PlaneSlots(capacity, shape.pixels(), shape.samples()) {}
+      : PlaneSlots(capacity, shape.pixels(), shape.samples()) {
+    shape_ = shape;
+  }
 
   // The bytes that PlaneSlots(capacity, pixels) reserves, and that the other does.
   static uint64_t bytes(int capacity, size_t pixels) { return bytes(capacity, pixels, pixels); }
@@ -47,8 +49,8 @@ class PlaneSlots {
   int capacity() const { return capacity_; }
   size_t pixels() const { return pixels_; }
   size_t plane_size() const { return plane_size_; }
-  // Of channel 1 or 2: pixels(), where none are shared.
-  size_t chroma_samples() const { return chroma_samples_; }
+  // Where no samples are shared, it may be nothing.
+  const ChromaShape& shape() const { return shape_; }
 
   const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
   uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
@@ -73,6 +75,7 @@ class PlaneSlots {
 
   int capacity_ = 0;
   size_t pixels_ = 0, plane_size_ = 0, chroma_samples_ = 0, chroma_size_ = 0;
+  ChromaShape shape_;
   uint64_t reserved_ = 0;
   std::unique_ptr<uint8_t[], Free> data_;
 };
@@ -113,6 +116,8 @@ class SnapshotRange {
   size_t pixels() const { return planes_->pixels(); }
   size_t plane_size() const { return planes_->plane_size(); }
   int slot(int index) const { return (first_slot_ + index * stride_) % planes_->capacity(); }
+  const ChromaShape& shape() const { return planes_->shape(); }
+  // As it is kept: of channels 1 and 2 the shared samples, if there are any.
   const uint8_t* plane(int index, int channel) const {
     return planes_->plane(slot(index), channel);
   }

@@ -136,20 +136,24 @@ bool split_uneven(const ImageView& frame, int first_row, int row_count, uint8_t 
                        width, to);
     }
   }
+  return is_constant_alpha(frame, first_row, row_count, alpha);
+}
+
+}  // namespace
+
+bool is_constant_alpha(const ImageView& frame, int first_row, int row_count, uint8_t alpha) {
   if (!frame.alpha || frame.alpha_is_padding) return true;
   const Spacing at = frame.spacing(3);
   bool constant = true;
   for (int y = first_row; y < first_row + row_count && constant; ++y) {
     const uint8_t* row = frame.alpha + y * at.row_stride;
     if (at.pixel_stride == 1)
-      constant = are_all(row, alpha, width);
+      constant = are_all(row, alpha, static_cast<size_t>(frame.width));
     else
       for (int x = 0; x < frame.width; ++x) constant &= row[x * at.pixel_stride] == alpha;
   }
   return constant;
 }
-
-}  // namespace
 
 bool split_channels(const ImageView& frame, int first_row, int row_count, uint8_t alpha,
                     uint8_t* const planes[3]) {

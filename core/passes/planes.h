@@ -15,6 +15,9 @@ namespace qdmd {
 bool split_channels(const ImageView& frame, int first_row, int row_count, uint8_t alpha,
                     uint8_t* const planes[3]);
 
+// Whether every alpha sample of these rows is `alpha`; true where the frame has none.
+bool is_constant_alpha(const ImageView& frame, int first_row, int row_count, uint8_t alpha);
+
 // Writes `count` pixels of one row of `out` from column `left` on. No channel has distances of its
 // own. channels: R, G, B; alpha: as
 // many samples, read where the format has alpha.
