@@ -9,6 +9,7 @@
 #include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdlearnt.h"
+#include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -82,7 +83,7 @@ static void forget_frames(GstQdmdBackground* self) {
 void drop_frames(GstQdmdBackground* self) {
   State* state = self->state;
   const std::lock_guard lock(state->engine_lock);
-  state->background.keep(state->engine, state->io);
+  state->background.keep(state->engine);
   state->engine.flush();
   forget_frames(self);
 }
@@ -95,7 +96,6 @@ void close(GstQdmdBackground* self) {
   state->regions = {};
   const std::lock_guard lock(state->engine_lock);
   state->engine.close();
-  state->io.clear();
 }
 
 // Copies what others may want to know of the engine.
@@ -253,8 +253,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       engine.set_mask_softness(settings.engine.mask_softness);
       engine.set_ignored(ignored_of(settings, shell.get()));
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
-      state->io.write(&frame, settings.output,
-                      [&](const MutableImageView& view) { engine.pop(settings.output, view); });
+      engine.pop(settings.output, frame.view<uint8_t>());
       note_solve(self, shell.get());
       return Status();
     });
@@ -367,12 +366,12 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   state->solves_told = 0;
   EngineOptions options = settings.engine;
   options.colours = colours_of(info);
-  options.caller_bytes = FrameIo::bytes(info);
+  options.levels = levels_of(info);
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
   const bool configured = with_engine(self, [&](Engine& engine) {
-    state->background.keep(engine, state->io);
+    state->background.keep(engine);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
@@ -478,7 +477,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_masks_expected(masks);
       engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
-      const Status status = engine.push(state->io.read(frame));
+      const Status status = engine.push(frame.view<const uint8_t>());
       note_solve(self, nullptr);
       return status;
     });

@@ -11,7 +11,6 @@
 #include "core/foreground/regions.h"
 #include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
-#include "gst/frameio.h"
 #include "gst/gstqdmdbackground.h"
 #include "gst/gstqdmdsettings.h"
 #include "gst/latency.h"
@@ -41,7 +40,6 @@ struct State {
   std::mutex engine_lock;
   // Protected by the engine lock.
   Engine engine;
-  FrameIo io;
   BackgroundSample background;
   Colours colours = Colours::rgb;  // of the video that the engine is configured for
   std::unique_ptr<Loaded> loaded;
