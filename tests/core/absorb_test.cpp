@@ -71,18 +71,24 @@ std::vector<double> white_of(const Clip& clip, const EngineOptions& options, int
   return white;
 }
 
-class Absorb : public testing::TestWithParam<Mode> {
+enum class Pace { batch, batch_beside, live };
+std::string name_of(Pace pace) {
+  return pace == Pace::live ? "Live" : pace == Pace::batch ? "Batch" : "BatchBeside";
+}
+
+class Absorb : public testing::TestWithParam<Pace> {
  protected:
   EngineOptions options() const {
     EngineOptions options = robust_of(50);
-    options.mode = GetParam();
+    options.mode = GetParam() == Pace::live ? Mode::live : Mode::batch;
+    // Frames that come fast: a window is solved while others come.
+    if (GetParam() == Pace::batch_beside) options.frame_rate = 1e4;
     return options;
   }
 };
-INSTANTIATE_TEST_SUITE_P(Modes, Absorb, testing::Values(Mode::batch, Mode::live),
-                         [](const auto& mode) {
-                           return mode.param == Mode::batch ? "Batch" : "Live";
-                         });
+INSTANTIATE_TEST_SUITE_P(Modes, Absorb,
+                         testing::Values(Pace::batch, Pace::batch_beside, Pace::live),
+                         [](const auto& pace) { return name_of(pace.param); });
 
 TEST_P(Absorb, WhatStandsIsForegroundForItsTimeAndThenBackground) {
   for (double light : {1.0, 0.8}) {

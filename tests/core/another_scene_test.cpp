@@ -71,19 +71,25 @@ Seen run(const Clip& clip, const EngineOptions& options) {
   return seen;
 }
 
-class AnotherScene : public testing::TestWithParam<Mode> {
+enum class Pace { batch, batch_beside, live };
+std::string name_of(Pace pace) {
+  return pace == Pace::live ? "Live" : pace == Pace::batch ? "Batch" : "BatchBeside";
+}
+
+class AnotherScene : public testing::TestWithParam<Pace> {
  protected:
   EngineOptions options(int window = 40) const {
     EngineOptions options = robust_of(window);
-    options.mode = GetParam();
+    options.mode = GetParam() == Pace::live ? Mode::live : Mode::batch;
+    // Frames that come fast: a window is solved while others come.
+    if (GetParam() == Pace::batch_beside) options.frame_rate = 1e4;
     return options;
   }
-  bool live() const { return GetParam() == Mode::live; }
+  bool live() const { return GetParam() == Pace::live; }
 };
-INSTANTIATE_TEST_SUITE_P(Modes, AnotherScene, testing::Values(Mode::batch, Mode::live),
-                         [](const auto& mode) {
-                           return mode.param == Mode::batch ? "Batch" : "Live";
-                         });
+INSTANTIATE_TEST_SUITE_P(Modes, AnotherScene,
+                         testing::Values(Pace::batch, Pace::batch_beside, Pace::live),
+                         [](const auto& pace) { return name_of(pace.param); });
 
 TEST_P(AnotherScene, IsLearntFromItsFirstFramesOn) {
   const auto before = view(1), after = view(2);
