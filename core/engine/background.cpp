@@ -37,6 +37,7 @@ void Background::return_to(const Learnt& learnt) {
   recall(learnt);
   show(learnt, State::held_in_light);
   decision_.forget();
+  scene_begins_ = false;
 }
 
 void Background::remember(Learnt* learnt) const {

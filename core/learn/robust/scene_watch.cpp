@@ -85,7 +85,7 @@ SceneWatch::Look SceneWatch::look_of(const std::vector<float>& frame,
     of_background += background_flat ? 0 : 1;
     strange += frame_flat != background_flat || tile.below(kStrangeTile);
   }
-  // Whoever stands before a bare wall brings edges to many tiles.
+  // Somebody who stands before a bare wall brings edges to many tiles.
   constexpr size_t kAll = kTilesAlong * kTilesAlong;
   if (static_cast<double>(strange) < kStrangeShare * static_cast<double>(edged)) return Look::same;
   return 2 * of_background >= kAll || 8 * edged >= 7 * kAll ? Look::strange : Look::doubtful;
