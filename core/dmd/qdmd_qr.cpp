@@ -34,9 +34,11 @@ BackgroundModes qdmd_from_qr(const SnapshotRange& snapshots, const DmdOptions& o
   for (Index first = 0; first < n; first += block)
     factor.r = qr(stacked(factor.r, snapshots, first, std::min(block, n - first)), false).r;
   factor.tolerance = static_cast<double>(std::max(n, m)) * std::numeric_limits<double>::epsilon();
+  // The pivots of frames that equal others shrink by epsilon each time, down to what underflows.
+  const double least = factor.tolerance * factor.r.norm();
   factor.triangular = factor.r.rows() >= m - 1;
   for (Index k = 0; factor.triangular && k + 1 < m; ++k)
-    factor.triangular = factor.r.a(k, k).real() > 0;
+    factor.triangular = factor.r.a(k, k).real() > least;
   return reduced_qdmd(factor, options);
 }
 

@@ -191,8 +191,7 @@ Real condition_estimate(const ScalarGrid<Real>& r) {
     Real squared(0);
     for (const auto& q : x) squared += q.squared_norm();
     const Real length = sqrt(squared);
-    if (length > Real(0))
-      for (auto& q : x) q = q * (Real(1) / length);
+    for (auto& q : x) q = q * (Real(1) / length);
     return length;
   };
   // Signs and sizes vary, so that no singular vector is likely to be missed.
@@ -209,8 +208,9 @@ Real condition_estimate(const ScalarGrid<Real>& r) {
     solve_upper_adjoint_in_place(r, small);
     solve_upper_in_place(r, small);
     decay = normalize(small);
+    // Entries overflowed, or a column became zero.
+    if (!(growth > Real(0)) || !square_is_safe(decay)) return std::numeric_limits<Real>::infinity();
   }
-  // Not a number where entries overflowed.
   const Real squared = growth * decay;
   return squared <= std::numeric_limits<Real>::max() ? std::max(Real(sqrt(squared)), Real(1))
                                                      : std::numeric_limits<Real>::infinity();

@@ -18,12 +18,20 @@ struct Reflector {
 template <typename Real>
 Reflector<Real> make_reflector(QuaternionMatrix<Real> x) {
   Reflector<Real> reflector;
+  // Columns of equal frames leave next to nothing of each other, whose square underflows.
+  const int exponent = square_is_safe(x.squared_norm()) ? 0 : x.normalize();
   const Quaternion<Real> head = x.get(0, 0);
   const Real length = x.norm();
   if (length > Real(0)) {
     reflector.alpha = head.unit() * -length;
     x.set(0, 0, head - reflector.alpha);
     reflector.tau = Real(2) / x.squared_norm();
+    if (exponent != 0) {
+      using std::ldexp;
+      Quaternion<Real>& a = reflector.alpha;
+      a = {Real(ldexp(a.w, exponent)), Real(ldexp(a.x, exponent)), Real(ldexp(a.y, exponent)),
+           Real(ldexp(a.z, exponent))};
+    }
   }
   reflector.v = std::move(x);
   return reflector;

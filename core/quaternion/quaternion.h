@@ -1,11 +1,19 @@
 // Scalar quaternions over any real type, with the paper's exponential and logarithm.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
 
 namespace qdmd {
+
+// True where no part of a sum of squares of that size was lost to underflow, nor to overflow.
+template <typename Real>
+bool square_is_safe(const Real& squared) {
+  return squared > std::numeric_limits<Real>::min() / std::numeric_limits<Real>::epsilon() &&
+         squared <= std::numeric_limits<Real>::max();
+}
 
 // q = w + x i + y j + z k. Real is double, a wider float or a multiprecision type.
 // The same number as a pair of complex numbers is q = (w + x i) + (y + z i) j.
@@ -35,12 +43,28 @@ struct Quaternion {
     using std::sqrt;
     return sqrt(x * x + y * y + z * z);
   }
-  // 1 / q; not finite for zero.
-  Quaternion inverse() const { return conj() * (Real(1) / squared_norm()); }
+  // |w|, |x|, |y| or |z|, whichever is largest.
+  Real largest_part() const {
+    using std::abs;
+    return std::max(std::max(Real(abs(w)), Real(abs(x))), std::max(Real(abs(y)), Real(abs(z))));
+  }
+  // 1 / q; not finite for zero, and where 1 / |q| overflows.
+  Quaternion inverse() const {
+    const Real squared = squared_norm();
+    if (square_is_safe(squared)) return conj() * (Real(1) / squared);
+    const Quaternion scaled = *this * (Real(1) / largest_part());
+    return scaled.conj() * (Real(1) / scaled.squared_norm()) * (Real(1) / largest_part());
+  }
   // q / |q|; one where q is zero, so that it can always serve as a phase.
   Quaternion unit() const {
-    const Real length = norm();
-    return length > Real(0) ? *this * (Real(1) / length) : Quaternion(Real(1));
+    const Real squared = squared_norm();
+    using std::sqrt;
+    if (square_is_safe(squared)) return *this * (Real(1) / Real(sqrt(squared)));
+    const Real inverse = Real(1) / largest_part();
+    // Zero, or so small that it has few digits left.
+    if (!(inverse <= std::numeric_limits<Real>::max())) return Quaternion(Real(1));
+    const Quaternion scaled = *this * inverse;
+    return scaled * (Real(1) / scaled.norm());
   }
 
   Quaternion operator-() const { return {-w, -x, -y, -z}; }

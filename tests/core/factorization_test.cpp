@@ -29,6 +29,21 @@ TEST(Reflector, SendsItsColumnToTheFirstAxis) {
   }
 }
 
+TEST(Reflector, OfAColumnWhoseSquaresUnderflow) {
+  std::mt19937 rng(29);
+  for (double size : {1e-290, 1e-170, 1e-158, 1e160}) {
+    const auto x = random_matrix(5, 1, rng).scale_cols(Eigen::VectorXd::Constant(1, size));
+    const auto h = make_reflector(x);
+    auto matrix = QuaternionMatrixd::identity(5);
+    apply_left(h, matrix, 0, 0, 5);
+    EXPECT_LE(orthonormality_error(matrix), 100 * kEpsilon) << size;
+    // A power of two past the range of squares.
+    const double scale = std::ldexp(1.0, -std::ilogb(size));
+    const auto large = x.scale_cols(Eigen::VectorXd::Constant(1, scale));
+    EXPECT_LE(distance(h.alpha * scale, make_reflector(large).alpha), 100 * kEpsilon) << size;
+  }
+}
+
 TEST(Reflector, OfZeroIsTheIdentity) {
   const auto h = make_reflector(QuaternionMatrixd(5, 1));
   EXPECT_EQ(h.tau, 0);
@@ -213,6 +228,15 @@ TEST(ConditionEstimate, IsALowerBoundNearTheTruth) {
       EXPECT_LE(estimate, truth * (1 + tolerance)) << size << ' ' << condition;
       EXPECT_GE(estimate, truth / 3) << size << ' ' << condition;
     }
+}
+
+// Repeated columns leave pivots of epsilon, epsilon^2, ..: their inverses overflow.
+TEST(ConditionEstimate, IsInfiniteWherePivotsVanish) {
+  for (double least : {1e-160, 1e-300, 0.0}) {
+    QuaternionMatrixd r = QuaternionMatrixd::identity(6);
+    for (Eigen::Index k = 3; k < 6; ++k) r.set(k, k, Quaterniond(least));
+    EXPECT_EQ(condition_estimate(ScalarGrid<double>(r)), kInfinity) << least;
+  }
 }
 
 TEST(SolveUpper, SolvesWithQuaternionPivots) {

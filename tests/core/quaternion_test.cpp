@@ -62,6 +62,16 @@ Quaterniond exp_series(const Quaterniond& q) {
   return sum;
 }
 
+// Also where squares underflow or overflow.
+TEST(Quaternion, InverseAndUnitOfAnySize) {
+  const Quaterniond q(0.5, -1, 0.25, 2);
+  for (double size : {1e-300, 1e-170, 1e-150, 1.0, 1e150, 1e300}) {
+    const Quaterniond unit = (q * size).unit(), one = (q * size) * (q * size).inverse();
+    EXPECT_LE(distance(unit, q.unit()), 8 * kEpsilon) << size;
+    EXPECT_LE(distance(one, Quaterniond(1.0)), 16 * kEpsilon) << size;
+  }
+}
+
 TEST(QuaternionExp, EqualsItsPowerSeries) {
   std::mt19937 rng(2);
   for (int i = 0; i < 100; ++i) {

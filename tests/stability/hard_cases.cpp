@@ -196,6 +196,12 @@ std::vector<HardCase> make_cases() {
   add("m = 2", "the decomposition is one quaternion", [] { return noisy(43, 2); });
   add("m = 1", "no pair of frames", [] { return noisy(44, 1); });
   add("n < m", "5 pixels, 11 frames", [] { return noisy(45, 11, 20, 5); });
+  add("small blink", "one level of one pixel in every second frame: pivots of epsilon's powers",
+      [] {
+        Clip clip = test::static_clip(picture(2, 40, 215), 24);
+        for (size_t t = 1; t < clip.size(); t += 2) ++clip.at(t, 0, kPixels / 2);
+        return clip;
+      });
   add("1024 frames", "a long window of 6 pixels", [] { return noisy(46, 1024, 8, 6); });
   return all;
 }
