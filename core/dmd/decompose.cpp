@@ -9,18 +9,6 @@
 namespace qdmd {
 namespace {
 
-QuaternionMatrixd pixels_of(const SnapshotRange& snapshots) {
-  const auto n = static_cast<Eigen::Index>(snapshots.pixels());
-  QuaternionMatrixd x(n, snapshots.size());
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* r = snapshots.plane(t, 0);
-    const uint8_t* g = snapshots.plane(t, 1);
-    const uint8_t* b = snapshots.plane(t, 2);
-    for (Eigen::Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
-  }
-  return x;
-}
-
 Decomposition single_snapshot() {
   Decomposition result;
   result.background = TemporalModel(1);
@@ -34,23 +22,6 @@ Decomposition single_snapshot() {
 }
 
 }  // namespace
-
-BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
-                                 const DmdOptions& options) {
-  if (options.solver == Solver::qr || options.solver == Solver::adjoint) gram.resize(0, 0);
-  switch (options.solver) {
-    case Solver::qr:
-      return qdmd_from_qr(snapshots, options);
-    case Solver::adjoint:
-      return qdmd_from_adjoint(pixels_of(snapshots), options);
-    case Solver::gram:
-    case Solver::gram_extended:
-      break;
-  }
-  QuaternionMatrixd g = quaternion_gram(gram);
-  gram.resize(0, 0);
-  return qdmd_from_gram(std::move(g), options);
-}
 
 Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
                         const DmdOptions& options) {
@@ -128,6 +99,7 @@ uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snaps
   constexpr double kSpace = 8 << 10;
   const double reduced = most_matrices(options) * matrix + kSpace;
   switch (options.solver) {
+    case Solver::automatic:
     case Solver::gram:
     case Solver::gram_extended:
       break;

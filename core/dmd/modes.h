@@ -15,6 +15,15 @@ namespace qdmd {
 template <typename Real>
 using ComplexVector = Eigen::Matrix<std::complex<Real>, Eigen::Dynamic, 1>;
 
+// How clear it was which modes are background.
+struct Selection {
+  // How much nearer to the origin, in rad/frame, the chosen modes are than the next one, or than
+  // the threshold; infinite where there is no other.
+  double margin = std::numeric_limits<double>::infinity();
+  // False: a bound from below, since not all modes were computed.
+  bool exact = true;
+};
+
 // The background part of a quaternion decomposition of m snapshots, P modes:
 // L(t) = sum_p X combination_p lambda_p^(t - reference_time_p) amplitude_p, X = [x_1 .. x_m].
 template <typename Real>
@@ -23,6 +32,7 @@ struct QuaternionModes {
   QuaternionMatrix<Real> combination;  // m x P
   QuaternionMatrix<Real> amplitudes;   // P x 1
   Eigen::VectorXd reference_times;     // P, frames
+  Selection selection;
   DmdSummary summary;
 
   QuaternionModes() = default;
@@ -48,7 +58,8 @@ Real omega_magnitude(const std::complex<Real>& lambda) {
 // distances keep their order. Empty only for no eigenvalues.
 template <typename Real>
 std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalues,
-                                            double threshold, int limit = 0) {
+                                            double threshold, int limit = 0,
+                                            Selection* selection = nullptr) {
   std::vector<Real> omega(static_cast<size_t>(eigenvalues.size()));
   for (size_t k = 0; k < omega.size(); ++k)
     omega[k] = omega_magnitude(eigenvalues(static_cast<Eigen::Index>(k)));
@@ -64,7 +75,26 @@ std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalu
   while (threshold > 0 && count < order.size() && omega_of(order[count]) <= Real(threshold))
     ++count;
   if (limit > 0) count = std::min(count, static_cast<size_t>(limit));
-  order.resize(std::min(order.size(), std::max<size_t>(count, 1)));
+  count = std::min(order.size(), std::max<size_t>(count, 1));
+  if (selection) {
+    *selection = {};
+    const auto distance = [&](size_t k) { return static_cast<double>(omega_of(order[k])); };
+    // Several infinite ones are as far as one another.
+    const auto less = [](double from, double by) { return by < from ? from - by : 0.0; };
+    if (count < order.size()) selection->margin = less(distance(count), distance(count - 1));
+    // The threshold decided, and not the limit.
+    if (threshold > 0 && count > 0 && distance(count - 1) <= threshold) {
+      const bool limited = limit > 0 && count == static_cast<size_t>(limit);
+      const double inside = threshold - distance(count - 1);
+      const double outside = count < order.size() && !limited
+                                 ? distance(count) - threshold
+                                 : std::numeric_limits<double>::infinity();
+      selection->margin = limited ? selection->margin : std::min(inside, outside);
+    } else if (threshold > 0 && count > 0) {
+      selection->margin = std::min(selection->margin, distance(0) - threshold);
+    }
+  }
+  order.resize(count);
   return order;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <complex>
+#include <limits>
 
 namespace qdmd {
 
@@ -9,8 +10,12 @@ enum class Solver {
   gram,           // from the exact Gram matrix alone
   gram_extended,  // the same with the Gram matrix factorized in double-double
   qr,             // from a Householder QR factorization of the pixel columns
-  adjoint         // the paper's procedure, literally, on the complex adjoint of the pixels
+  adjoint,        // the paper's procedure, literally, on the complex adjoint of the pixels
+  automatic       // gram, and gram_extended where the bound of gram is not below kSureBound
 };
+
+// Levels: below a quarter, the background's own rounding to whole levels costs more.
+inline constexpr double kSureBound = 0.25;
 
 enum class Amplitude {
   window,      // least squares of the background modes over all snapshots
@@ -44,6 +49,14 @@ struct DmdSummary {
   double condition = 1;
   // False: the eigenvalue iteration did not end, and rank one was solved in its place.
   bool converged = true;
+  // The one that gave the result: another than was asked for where that one could not.
+  Solver solver = Solver::gram;
+  // No level of L(t) inside the window is farther from what exact arithmetic gives; infinite where
+  // that cannot be told. Of exact DMD: not computed, infinite.
+  double rounding_bound = std::numeric_limits<double>::infinity();
+  // Root of the mean square of L(t)'s movement, in levels, when every level of the frames moves at
+  // random by up to a half; infinite where another mode may become the nearest one.
+  double sensitivity = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace qdmd

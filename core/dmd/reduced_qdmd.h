@@ -82,6 +82,7 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
     fit_to_window(&result, factor.r * result.combination, factor.r);
   }
   describe_nearest(&result, pair->residual);
+  result.selection = {static_cast<double>(pair->margin), pair->exact};
   return result;
 }
 
@@ -110,12 +111,14 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
   const ComplexVector<Real> eigenvalues = form.eigenvalues();
+  Selection selection;
   const auto chosen =
-      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes);
+      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
   const auto coefficients = projection.coefficients * form.q;
 
   // Step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
   QuaternionModes<Real> result(m, static_cast<Eigen::Index>(chosen.size()));
+  result.selection = selection;
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p) {
     const Eigen::Index k = chosen[static_cast<size_t>(p)];
     const auto w = triangular_eigenvector(form.t, k);
