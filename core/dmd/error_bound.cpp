@@ -115,6 +115,8 @@ double rounding_bound(const SolvedWindow& solved) {
   const auto& [gram, pixels, options, factor, modes] = solved;
   const Index m = gram.cols();
   if (modes.eigenvalues.size() == 0) return 0;
+  // Where the tolerance would be met by other digits, nobody knows.
+  if (modes.selection.dependent) return kInfinity;
   // Errors of m sums add up like random numbers: a few epsilon times the root of m.
   const double size = 4 * std::sqrt(static_cast<double>(m)) * kEpsilon;
   double largest = 0;

@@ -22,6 +22,9 @@ struct Selection {
   double margin = std::numeric_limits<double>::infinity();
   // False: a bound from below, since not all modes were computed.
   bool exact = true;
+  // Modes depend on each other to within rounding: a tolerance decided how they share what they
+  // have in common.
+  bool dependent = false;
 };
 
 // The background part of a quaternion decomposition of m snapshots, P modes:
@@ -126,12 +129,13 @@ void scale_rows(QuaternionMatrix<Real>& m, const Scale& scale) {
 
 // Amplitudes b (P x 1) that minimize sum_t |x_t - sum_p phi_p lambda_p^(t - reference_p) b_p|^2.
 // phi_phi = Phi^H Phi (P x P), phi_x = Phi^H [x_1 .. x_m] (P x m). Dependent modes share the
-// minimum-norm solution.
+// minimum-norm solution, and `dependent` is set.
 template <typename Real>
 QuaternionMatrix<Real> fit_window_amplitudes(const ComplexVector<Real>& eigenvalues,
                                              const Eigen::VectorXd& reference_times,
                                              const QuaternionMatrix<Real>& phi_phi,
-                                             const QuaternionMatrix<Real>& phi_x) {
+                                             const QuaternionMatrix<Real>& phi_x,
+                                             bool* dependent = nullptr) {
   using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   using ComplexMatrix = typename QuaternionMatrix<Real>::ComplexMatrix;
   using std::sqrt;
@@ -165,6 +169,10 @@ QuaternionMatrix<Real> fit_window_amplitudes(const ComplexVector<Real>& eigenval
   const Real tolerance = gram_tolerance<Real>(modes) * eigen.values(0);
   const Vector inverse = eigen.values.unaryExpr(
       [&](const Real& v) { return v > tolerance && v > Real(0) ? Real(Real(1) / v) : Real(0); });
+  // Normal equations square how dependent modes are: half of the digits is what they may cost.
+  if (dependent)
+    *dependent = modes > 1 && !(eigen.values(modes - 1) >
+                                sqrt(std::numeric_limits<Real>::epsilon()) * eigen.values(0));
   QuaternionMatrix<Real> b =
       eigen.vectors.scale_cols(inverse) * (eigen.vectors.conjugate_transpose() * rhs);
   internal::scale_rows(b, scale);
@@ -179,16 +187,19 @@ void fit_to_window(QuaternionModes<Real>* modes, const QuaternionMatrix<Real>& p
   for (Eigen::Index p = 0; p < modes->eigenvalues.size(); ++p)
     modes->reference_times(p) = fit_reference_time(modes->eigenvalues(p), x.cols());
   const auto phi_h = phi.conjugate_transpose();
-  modes->amplitudes = fit_window_amplitudes<Real>(modes->eigenvalues, modes->reference_times,
-                                                  phi_h * phi, phi_h * x);
+  modes->amplitudes =
+      fit_window_amplitudes<Real>(modes->eigenvalues, modes->reference_times, phi_h * phi,
+                                  phi_h * x, &modes->selection.dependent);
 }
 
 // The b (r x 1) that minimizes |M b - x|, the one of least norm among equals: QR factorization with
 // column pivoting of the complex adjoint, columns scaled to norm one. M: k x r, x: k x 1. With the
 // modes Phi for M and the first snapshot for x these are the paper's amplitudes Phi^+ x_1.
+// `dependent` is set where rounding may have decided what is dependent.
 template <typename Real>
 QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,
-                                     const QuaternionMatrix<Real>& x) {
+                                     const QuaternionMatrix<Real>& x, bool* dependent = nullptr) {
+  using std::sqrt;
   // Unit columns first, so that small modes are not taken for dependent ones.
   Eigen::Matrix<Real, Eigen::Dynamic, 1> scale(m.cols());
   for (Eigen::Index p = 0; p < m.cols(); ++p) {
@@ -198,8 +209,15 @@ QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,
   const auto chi = m.scale_cols(scale).adjoint();
   typename QuaternionMatrix<Real>::ComplexMatrix rhs(2 * x.rows(), 1);
   rhs << x.a, -x.b.conjugate();
-  const typename QuaternionMatrix<Real>::ComplexMatrix solution =
-      chi.completeOrthogonalDecomposition().solve(rhs);
+  const auto factors = chi.completeOrthogonalDecomposition();
+  const typename QuaternionMatrix<Real>::ComplexMatrix solution = factors.solve(rhs);
+  if (dependent) {
+    // Columns that are rounding beside the others, or become so once these are taken away.
+    const Real half = sqrt(std::numeric_limits<Real>::epsilon());
+    const auto pivots = factors.matrixQTZ().diagonal().cwiseAbs().eval();
+    *dependent = chi.cols() > 2 && (!(pivots.minCoeff() > half * pivots.maxCoeff()) ||
+                                    !(scale.minCoeff() > half * scale.maxCoeff()));
+  }
   auto b = QuaternionMatrix<Real>::from_adjoint_columns(solution);
   internal::scale_rows(b, scale);
   return b;

@@ -82,7 +82,8 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
     fit_to_window(&result, factor.r * result.combination, factor.r);
   }
   describe_nearest(&result, pair->residual);
-  result.selection = {static_cast<double>(pair->margin), pair->exact};
+  result.selection.margin = static_cast<double>(pair->margin);
+  result.selection.exact = pair->exact;
   return result;
 }
 
@@ -98,8 +99,12 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   const auto identity = QuaternionMatrix<Real>::identity(rank);
   if (amplitude == Amplitude::window)
     return nearest_mode<Real>(h, identity, &coefficients, nullptr, factor);
-  const auto a = least_squares<Real>(factor.r.right_cols(later) * coefficients, factor.r.col(0));
-  return nearest_mode<Real>(h, identity, &coefficients, &a, factor);
+  bool dependent = false;
+  const auto a =
+      least_squares<Real>(factor.r.right_cols(later) * coefficients, factor.r.col(0), &dependent);
+  auto result = nearest_mode<Real>(h, identity, &coefficients, &a, factor);
+  if (result) result->selection.dependent = dependent;
+  return result;
 }
 
 // All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
@@ -133,7 +138,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
     return result;
   }
   if (chosen.size() == 1) {
-    const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0));
+    const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0),
+                                       &result.selection.dependent);
     const auto b = amplitude_from_left_vector<Real>(triangular_left_eigenvector(form.t, chosen[0]),
                                                     triangular_eigenvector(form.t, chosen[0]), a);
     if (b) {
@@ -145,7 +151,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   QuaternionModes<Real> all(m, rank);
   for (Eigen::Index k = 0; k < rank; ++k)
     set_combination(&all, k, coefficients * triangular_eigenvector(form.t, k));
-  const auto b = least_squares<Real>(factor.r * all.combination, factor.r.col(0));
+  const auto b =
+      least_squares<Real>(factor.r * all.combination, factor.r.col(0), &result.selection.dependent);
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p)
     result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   return result;

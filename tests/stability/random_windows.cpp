@@ -268,6 +268,9 @@ Verdict judge(const Clip& clip, const DmdOptions& options, bool digits) {
   if (digits) {
     reference.emplace(gram, pixels_of(clip));
     answer = reference->solve(options);
+    // The eigenvalue iteration in 50 digits has its limit, too.
+    verdict.without_reference = !answer.converged;
+    digits = answer.converged;
   }
   for (Solver solver : kSolvers) {
     DmdOptions asked = options;

@@ -28,6 +28,7 @@ struct Verdict {
   // The largest true error over its bound, and the other way round where a bound was finite.
   double worst = 0, loosest = 0;
   int finite_bounds = 0, solves = 0;
+  bool without_reference = false;  // 50 digits have no answer
 };
 // By all solvers. Finite always; `digits`: and no farther from 50 digits than the bound.
 Verdict judge(const test::Clip& clip, const DmdOptions& options, bool digits);

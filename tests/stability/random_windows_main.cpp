@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
       first = static_cast<uint64_t>(std::atoll(argv[++i]));
     if (!std::strcmp(argv[i], "--frames") && i + 1 < argc) frames = std::atoi(argv[++i]);
   }
-  uint64_t faults = 0, solves = 0, bounds = 0;
+  uint64_t faults = 0, solves = 0, bounds = 0, without = 0;
   double worst = 0, loosest = 0;
   for (uint64_t seed = first; seed < first + count; ++seed) {
     const auto window = random_window(seed, frames);
@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
     const auto verdict = judge(window.clip, options, digits);
     solves += static_cast<uint64_t>(verdict.solves);
     bounds += static_cast<uint64_t>(verdict.finite_bounds);
+    without += verdict.without_reference;
     worst = std::max(worst, verdict.worst);
     loosest = std::max(loosest, verdict.loosest);
     for (const auto& fault : verdict.faults) {
@@ -47,8 +48,10 @@ int main(int argc, char** argv) {
   std::printf("%llu windows, %llu solves: %llu faults", static_cast<unsigned long long>(count),
               static_cast<unsigned long long>(solves), static_cast<unsigned long long>(faults));
   if (digits)
-    std::printf("; %llu finite bounds, the true error at most %.2g of its bound",
-                static_cast<unsigned long long>(bounds), worst);
+    std::printf(
+        "; %llu finite bounds, the true error at most %.2g of its bound; %llu windows without an "
+        "answer in 50 digits",
+        static_cast<unsigned long long>(bounds), worst, static_cast<unsigned long long>(without));
   std::printf("\n");
   return faults > 0;
 }
