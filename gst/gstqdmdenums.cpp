@@ -78,6 +78,8 @@ GType gst_qdmd_background_amplitude_get_type() {
 
 GType gst_qdmd_background_solver_get_type() {
   static const GEnumValue values[] = {
+      {int(qdmd::Solver::automatic),
+       "gram, and gram-extended where gram may be off by a quarter of a level", "auto"},
       {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
       {int(qdmd::Solver::gram_extended),
        "The Gram matrix factorized in double-double: for nearly dependent frames", "gram-extended"},

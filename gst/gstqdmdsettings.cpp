@@ -96,8 +96,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum(
            "solver", "Solver",
-           "How the decomposition of method=qdmd and robust is computed; same picture, other cost "
-           "(not used by method=dmd)",
+           "How the decomposition of method=qdmd and robust is computed; same picture, other cost: "
+           "one that gets nowhere hands on to a more careful one (not used by method=dmd)",
            gst_qdmd_background_solver_get_type(), gint(d.engine.dmd.solver), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.solver)},

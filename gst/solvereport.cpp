@@ -1,5 +1,7 @@
 #include "gst/solvereport.h"
 
+#include "gst/gstqdmdenums.h"
+
 namespace qdmd {
 
 GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
@@ -9,13 +11,16 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
       G_TYPE_UINT, guint(report.window_frames), "rank", G_TYPE_UINT, guint(report.dmd.rank),
       "background-modes", G_TYPE_UINT, guint(report.dmd.background_modes), "omega", G_TYPE_DOUBLE,
       report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual, "condition", G_TYPE_DOUBLE,
-      report.dmd.condition, "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged), "noise",
-      G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
-      report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
-      "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
-      "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT,
-      guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,
-      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
+      report.dmd.condition, "rounding-bound", G_TYPE_DOUBLE, report.dmd.rounding_bound,
+      "sensitivity", G_TYPE_DOUBLE, report.dmd.sensitivity, "solver",
+      gst_qdmd_background_solver_get_type(), gint(report.dmd.solver), "converged", G_TYPE_BOOLEAN,
+      gboolean(report.dmd.converged), "noise", G_TYPE_DOUBLE, report.foreground.noise,
+      "foreground-threshold", G_TYPE_DOUBLE, report.foreground.threshold, "foreground-ratio",
+      G_TYPE_DOUBLE, report.foreground.ratio, "gram-time", G_TYPE_DOUBLE, report.gram_time,
+      "solve-time", G_TYPE_DOUBLE, report.solve_time, "sample-step", G_TYPE_UINT,
+      guint(report.sample_step), "iterations", G_TYPE_UINT, guint(report.iterations),
+      "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame", G_TYPE_DOUBLE,
+      counters.time_per_frame, nullptr);
   GValue lambda = G_VALUE_INIT, part = G_VALUE_INIT;
   gst_value_array_init(&lambda, 2);
   g_value_init(&part, G_TYPE_DOUBLE);
@@ -43,6 +48,9 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
       "rank", G_TYPE_UINT, guint(report.dmd.rank), "lambda-real", G_TYPE_DOUBLE,
       report.dmd.lambda.real(), "lambda-imaginary", G_TYPE_DOUBLE, report.dmd.lambda.imag(),
       "omega", G_TYPE_DOUBLE, report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual,
+      "rounding-bound", G_TYPE_DOUBLE, report.dmd.rounding_bound, "sensitivity", G_TYPE_DOUBLE,
+      report.dmd.sensitivity, "solver", gst_qdmd_background_solver_get_type(),
+      gint(report.dmd.solver), "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged),
       "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio, "solve-time", G_TYPE_DOUBLE,
       report.solve_time, "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations",
       G_TYPE_UINT, guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,

@@ -1,5 +1,7 @@
 #include "core/dmd/error_bound.h"
 
+#include "core/dmd/estimator.h"
+
 #include <cmath>
 #include <cstdint>
 
@@ -15,10 +17,13 @@ constexpr double kWhite = 255 * 1.7320508075688772;
 // Random directions whose movement is looked at, and the room for those that are not (Kenney and
 // Laub 1994: the chance that k directions all show less than 1 / room of the largest falls with
 // room^k).
-constexpr int kDirections = 3;
-constexpr double kRoom = 10;
-// Of half a level: two are typical of all.
-constexpr int kDataDirections = 2;
+constexpr int kDirections = 3, kDataDirections = 2;
+// A direction in the space of many frames is many directions.
+constexpr Index kManyFrames = 50;
+constexpr double kRoom = 30;
+// An error that many frames' rounding makes is spread over the picture: no pixel has more than so
+// many times the mean. One that is not spread out has less room, that of `largest` itself.
+constexpr double kPeak = 6;
 
 // Numbers between -1 and 1 that repeat from run to run, of mean square 1/3.
 class Random {
@@ -45,6 +50,17 @@ QuaternionMatrixd random_matrix(Index rows, Index cols, double size, uint64_t se
   for (Index c = 0; c < cols; ++c)
     for (Index r = 0; r < rows; ++r) m.set(r, c, random(size / 2));
   return m;
+}
+
+// size times a random unitary matrix, first `rows` rows, with columns that are orthogonal like the
+// noise of different frames: r^H times it costs no more than reflections do. m x m, from the left
+// times r^H for r of as many rows.
+QuaternionMatrixd turned(const QuaternionMatrixd& r, double size, uint64_t seed) {
+  QuaternionMatrixd result = r.conjugate_transpose();
+  for (uint64_t k = 0; k < 3; ++k)
+    apply_right(make_reflector(random_matrix(r.rows(), 1, 1, 7 * seed + k)), result, 0,
+                result.rows(), 0);
+  return result.scale_cols(Eigen::VectorXd::Constant(result.cols(), size));
 }
 
 double longest_column(const QuaternionMatrixd& r) {
@@ -117,11 +133,14 @@ double rounding_bound(const SolvedWindow& solved) {
   if (modes.eigenvalues.size() == 0) return 0;
   // Where the tolerance would be met by other digits, nobody knows.
   if (modes.selection.dependent) return kInfinity;
-  // Errors of m sums add up like random numbers: a few epsilon times the root of m.
-  const double size = 4 * std::sqrt(static_cast<double>(m)) * kEpsilon;
-  double largest = 0;
+  // Errors of m sums add up like random numbers: a few epsilon times the root of m. In a Gram
+  // matrix of frames that are alike, all but the first product is small beside its elements.
+  const double size = factor.squared ? 4 * kEpsilon
+                                     : 4 * std::sqrt(static_cast<double>(m)) * kEpsilon *
+                                           std::max(1.0, modes.selection.operator_size);
+  BackgroundDistance moved_by;
   Movement movement;
-  for (int direction = 1; direction <= kDirections; ++direction) {
+  for (int direction = 1; direction <= (m < kManyFrames ? kDirections : 1); ++direction) {
     const auto seed = static_cast<uint64_t>(direction);
     SnapshotFactor<double> moved;
     if (factor.squared) {
@@ -137,12 +156,14 @@ double rounding_bound(const SolvedWindow& solved) {
           size * longest_column(factor.r) / std::sqrt(static_cast<double>(moved.r.rows())), seed);
       if (moved.triangular) moved.r = qr(std::move(moved.r), false).r;
     }
-    const auto other = reduced_qdmd(moved, options);
-    const double distance = background_distance(factor.r, pixels, modes, other).largest;
-    if (!(distance <= largest)) largest = distance;
+    const auto other = solve_factor(moved, options);
+    const auto distance = background_distance(factor.r, pixels, modes, other);
+    moved_by.largest = std::max(moved_by.largest, distance.largest);
+    moved_by.mean = std::max(moved_by.mean, distance.mean);
     movement.see(modes, other);
   }
-  return movement.may_choose_another(modes, kRoom) ? kInfinity : kRoom * largest;
+  if (movement.may_choose_another(modes, kRoom)) return kInfinity;
+  return std::max(moved_by.largest, kRoom * std::min(moved_by.largest, kPeak * moved_by.mean));
 }
 
 double sensitivity(const SolvedWindow& solved) {
@@ -151,22 +172,30 @@ double sensitivity(const SolvedWindow& solved) {
   if (modes.eigenvalues.size() == 0) return 0;
   double mean = 0;
   Movement movement;
-  for (int direction = 1; direction <= kDataDirections; ++direction) {
+  for (int direction = 1; direction <= (m < kManyFrames ? kDataDirections : 1); ++direction) {
     // Three channels, each of mean square 1/12: 1/4 for a pixel, and along any unit vector.
-    auto r = factor.r + random_matrix(rank, m, 0.5, 100 + static_cast<uint64_t>(direction));
+    const uint64_t seed = 100 + static_cast<uint64_t>(direction);
     SnapshotFactor<double> moved;
     const bool full = options.rank == 0 || options.rank >= m - 1;
     if (factor.triangular && full) {
       // And all that stands upright on the snapshots.
-      auto g = r.conjugate_transpose() * r;
-      g.a.diagonal().array() += std::max(0.0, pixels - static_cast<double>(rank)) / 4;
+      const double around = std::sqrt(static_cast<double>(rank)) / 2;
+      auto square = factor.r;
+      if (rank < m) {
+        square = QuaternionMatrixd(m, m);
+        square.a.topRows(rank) = factor.r.a;
+        square.b.topRows(rank) = factor.r.b;
+      }
+      const auto product = turned(square, around, seed);
+      auto g = gram + product + product.conjugate_transpose();
+      g.a.diagonal().array() += std::max(pixels, static_cast<double>(rank)) / 4;
       moved = factorize_gram(g);
     } else {
       moved = factor;
       moved.triangular = false;
-      moved.r = std::move(r);
+      moved.r += random_matrix(rank, m, 0.5, seed);
     }
-    const auto other = reduced_qdmd(moved, options);
+    const auto other = solve_factor(moved, options);
     const double distance = background_distance(factor.r, pixels, modes, other).mean;
     if (!(distance <= mean)) mean = distance;
     movement.see(modes, other);

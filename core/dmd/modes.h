@@ -25,6 +25,8 @@ struct Selection {
   // Modes depend on each other to within rounding: a tolerance decided how they share what they
   // have in common.
   bool dependent = false;
+  // |Q~| where the modes are those of a projected operator, whose rounding has its size; else one.
+  double operator_size = 1;
 };
 
 // The background part of a quaternion decomposition of m snapshots, P modes:

@@ -22,9 +22,18 @@ enum class Amplitude {
   first_frame  // b = Phi^+ x_1, the paper's
 };
 
+// How the operator is estimated from frames that have noise.
+enum class Estimator {
+  exact,             // Q~ = U^H Y V S^-1, the paper's: noise in X shrinks |lambda|
+  forward_backward,  // the geometric mean of it and of that of time turned back
+  total,             // on the frames' part that X and Y have in common (total least squares)
+  optimized          // the modes' exponentials, fitted to all frames at once
+};
+
 struct DmdOptions {
-  Solver solver = Solver::gram;
+  Solver solver = Solver::automatic;
   Amplitude amplitude = Amplitude::window;
+  Estimator estimator = Estimator::exact;
   // Rank of the truncated decomposition; 0, or more than the numerical rank: full.
   int rank = 0;
   // Background: all modes with |omega| <= this, in rad/frame. 0, or no mode that near: the one

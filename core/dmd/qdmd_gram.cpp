@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "core/dmd/estimator.h"
 #include "core/dmd/qdmd.h"
 #include "core/dmd/reduced_qdmd.h"
 #include "core/quaternion/double_double.h"
@@ -30,10 +31,10 @@ template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&, con
 
 BackgroundModes qdmd_from_gram(QuaternionMatrixd g, const DmdOptions& options) {
   if (options.solver == Solver::gram_extended)
-    return reduced_qdmd(factorize_gram_extended(g), options);
+    return solve_factor(factorize_gram_extended(g), options);
   const auto factor = factorize_gram(g);
   g = {};
-  return reduced_qdmd(factor, options);
+  return solve_factor(factor, options);
 }
 
 }  // namespace qdmd

@@ -107,15 +107,30 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   return result;
 }
 
+// The eigenvalue of the Schur form as it is.
+struct SameEigenvalue {
+  template <typename Real>
+  std::complex<Real> operator()(const std::complex<Real>& value,
+                                const QuaternionMatrix<Real>& /*vector*/) const {
+    return value;
+  }
+};
+
 // All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
-template <typename Real>
+// `eigenvalue`: from an eigenvalue of Q~ and its vector to that of the modes.
+template <typename Real, typename Eigenvalue = SameEigenvalue>
 std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real>& projection,
                                                            const SnapshotFactor<Real>& factor,
-                                                           const DmdOptions& options) {
+                                                           const DmdOptions& options,
+                                                           const Eigenvalue& eigenvalue = {}) {
   const Eigen::Index m = factor.r.cols(), rank = projection.q_tilde.rows();
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
-  const ComplexVector<Real> eigenvalues = form.eigenvalues();
+  const ComplexVector<Real> of_operator = form.eigenvalues();
+  ComplexVector<Real> eigenvalues = of_operator;
+  if constexpr (!std::is_same_v<Eigenvalue, SameEigenvalue>)
+    for (Eigen::Index k = 0; k < rank; ++k)
+      eigenvalues(k) = eigenvalue(of_operator(k), form.q * triangular_eigenvector(form.t, k));
   Selection selection;
   const auto chosen =
       select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
@@ -131,7 +146,7 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
     set_combination(&result, p, coefficients * w);
     if (p == 0)
       describe_nearest(&result,
-                       eigenpair_residual<Real>(projection.q_tilde, form.q * w, eigenvalues(k)));
+                       eigenpair_residual<Real>(projection.q_tilde, form.q * w, of_operator(k)));
   }
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, factor.r * result.combination, factor.r);
@@ -191,6 +206,7 @@ std::optional<QuaternionModes<Real>> full_rank_modes(const SnapshotFactor<Real>&
     projection.q_tilde = h * projection.coefficients;
     h = {};
     result = modes_from_schur_form(projection, factor, options);
+    if (result) result->selection.operator_size = static_cast<double>(projection.q_tilde.norm());
   }
   if (!result || !result->combination.all_finite() || !result->amplitudes.all_finite())
     return std::nullopt;
@@ -291,6 +307,7 @@ QuaternionModes<Real> projected_modes(const SnapshotFactor<Real>& factor,
       none.summary.converged = false;
       continue;
     }
+    result->selection.operator_size = static_cast<double>(projection.q_tilde.norm());
     result->summary.converged = none.summary.converged;
     result->summary.rank = static_cast<int>(rank);
     result->summary.condition = static_cast<double>(spectrum.sigma(0) / spectrum.sigma(rank - 1));

@@ -5,6 +5,7 @@
 
 #include "core/dmd/decompose.h"
 #include "core/dmd/error_bound.h"
+#include "core/dmd/estimator.h"
 #include "core/dmd/qdmd.h"
 
 namespace qdmd {
@@ -54,6 +55,10 @@ class Ladder {
       : snapshots_(snapshots), gram_(gram), options_(options) {}
 
   BackgroundModes climb() {
+    // The estimators work on inner products.
+    if (options_.estimator != Estimator::exact &&
+        (options_.solver == Solver::qr || options_.solver == Solver::adjoint))
+      options_.solver = Solver::gram_extended;
     switch (options_.solver) {
       case Solver::automatic: {
         auto fast = from_gram(false);
@@ -105,11 +110,14 @@ class Ladder {
   // comparison with extended(), if `compare`, else anything may have been.
   std::optional<BackgroundModes> from_gram(bool compare) {
     const auto factor = factorize_gram(gram_);
-    auto modes = reduced_qdmd(factor, options_);
+    auto modes = solve_factor(factor, options_);
     modes.summary.solver = Solver::gram;
     if (!usable(modes)) return std::nullopt;
     const Index most = std::min<Index>(gram_.cols() - 1, static_cast<Index>(snapshots_.pixels()));
-    const Index wanted = options_.rank > 0 ? std::min<Index>(options_.rank, most) : most;
+    const bool low_rank =
+        options_.estimator == Estimator::forward_backward || options_.estimator == Estimator::total;
+    const Index wanted =
+        options_.rank > 0 || low_rank ? std::min<Index>(std::max(1, options_.rank), most) : most;
     const bool whole = modes.summary.rank >= wanted;
     if (!whole && compare) return compared(std::move(modes));
     if (whole) set_bounds(factor, &modes);
@@ -118,7 +126,7 @@ class Ladder {
 
   std::optional<BackgroundModes> extended() {
     const auto factor = factorize_gram_extended(gram_);
-    auto modes = reduced_qdmd(factor, options_);
+    auto modes = solve_factor(factor, options_);
     modes.summary.solver = Solver::gram_extended;
     if (!usable(modes)) return std::nullopt;
     set_bounds(factor, &modes);

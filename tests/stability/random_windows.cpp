@@ -282,14 +282,13 @@ Verdict judge(const Clip& clip, const DmdOptions& options, bool digits) {
       continue;
     }
     const double bound = result.summary.rounding_bound;
+    verdict.errors.push_back(-1);
     if (!digits || !(bound < std::numeric_limits<double>::infinity())) continue;
     ++verdict.finite_bounds;
     const double error =
         level_error(answer, reference->answer(quaternion_modes(window, gram, asked)));
-    if (error > 0) {
-      verdict.worst = std::max(verdict.worst, error / bound);
-      verdict.loosest = std::max(verdict.loosest, bound / error);
-    }
+    verdict.errors.back() = error > 0 ? error / bound : 0;
+    verdict.worst = std::max(verdict.worst, verdict.errors.back());
     if (!(error <= bound)) {
       std::ostringstream line;
       line << test::name_of(solver) << ": off by " << error << " levels, bound " << bound

@@ -25,8 +25,8 @@ DmdOptions random_options(uint64_t seed);
 // What went wrong, one line each; empty: nothing.
 struct Verdict {
   std::vector<std::string> faults;
-  // The largest true error over its bound, and the other way round where a bound was finite.
-  double worst = 0, loosest = 0;
+  double worst = 0;            // the largest true error over its bound
+  std::vector<double> errors;  // the true errors over their bounds, by solver; -1: no finite bound
   int finite_bounds = 0, solves = 0;
   bool without_reference = false;  // 50 digits have no answer
 };

@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
     if (!std::strcmp(argv[i], "--frames") && i + 1 < argc) frames = std::atoi(argv[++i]);
   }
   uint64_t faults = 0, solves = 0, bounds = 0, without = 0;
-  double worst = 0, loosest = 0;
+  double worst = 0;
   for (uint64_t seed = first; seed < first + count; ++seed) {
     const auto window = random_window(seed, frames);
     const auto options = random_options(seed);
@@ -34,7 +34,6 @@ int main(int argc, char** argv) {
     bounds += static_cast<uint64_t>(verdict.finite_bounds);
     without += verdict.without_reference;
     worst = std::max(worst, verdict.worst);
-    loosest = std::max(loosest, verdict.loosest);
     for (const auto& fault : verdict.faults) {
       ++faults;
       std::printf("%llu (%s; %zu pixels, %zu frames, rank %d, %s, threshold %g) %s\n",
