@@ -91,3 +91,16 @@ GType gst_qdmd_background_solver_get_type() {
   static const GType type = g_enum_register_static("GstQdmdBackgroundSolver", values);
   return type;
 }
+
+GType gst_qdmd_background_estimator_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Estimator::exact), "The paper's: noise shrinks abs(lambda)", "exact"},
+      {int(qdmd::Estimator::forward_backward),
+       "The geometric mean of the operators of time and of time turned back", "forward-backward"},
+      {int(qdmd::Estimator::total), "Total least squares: noise in both frames of a pair", "total"},
+      {int(qdmd::Estimator::optimized),
+       "The background's exponentials, fitted to all frames at once", "optimized"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundEstimator", values);
+  return type;
+}

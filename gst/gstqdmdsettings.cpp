@@ -102,6 +102,14 @@ const Property kProperties[] = {
      },
      QDMD_ENUM(s.engine.dmd.solver)},
     {[](const Settings& d) {
+       return g_param_spec_enum(
+           "estimator", "Estimator",
+           "How eigenvalues are estimated from frames with noise, for method=qdmd and robust; "
+           "forward-backward and total take rank=0 for 1 (not used by method=dmd)",
+           gst_qdmd_background_estimator_get_type(), gint(d.engine.dmd.estimator), kAtStart);
+     },
+     QDMD_ENUM(s.engine.dmd.estimator)},
+    {[](const Settings& d) {
        return g_param_spec_uint("sample-step", "Sample step",
                                 "The decomposition sees every k-th pixel in x and y; the output "
                                 "stays full size (0: all pixels for qdmd and dmd, about 60 along "
