@@ -80,15 +80,16 @@ namespace {
 
 // How many m x m matrices are alive at once where most are, the snapshot factor R included.
 double most_matrices(const DmdOptions& options) {
-  const bool extended = options.solver == Solver::gram_extended;
+  // Beside a solve: the Gram matrix, and what is moved to see how sure it is.
+  constexpr double kSure = 2;
   // The amplitudes of all modes at once, by Eigen on the complex adjoint.
-  if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14;
+  if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14 + kSure;
   // Singular values: from a Hermitian matrix's eigenvectors, or without squaring.
-  if (options.rank > 0) return options.solver == Solver::gram ? 8 : 10.7;
-  // G and its factor in double-double; the right-hand side of first_frame beside the pencil.
-  if (extended || options.amplitude == Amplitude::first_frame) return 8;
+  if (options.rank > 0) return (options.solver == Solver::gram ? 8 : 10.7) + kSure;
+  // The right-hand side of first_frame beside the pencil.
+  if (options.amplitude == Amplitude::first_frame) return 8 + kSure;
   // R, the pencil H and R11 twice, H - R11 twice.
-  return 7;
+  return 7 + kSure;
 }
 
 }  // namespace

@@ -45,8 +45,7 @@ std::optional<BackgroundModes> forward_backward_modes(const SnapshotFactor<doubl
     const std::complex<double> principal = std::sqrt(value);
     // Time that alternates has the root -1 of 1.
     const double side = (w.conjugate_transpose() * (forward * w)).get(0, 0).w;
-    const std::complex<double> chosen = side < 0 ? -principal : principal;
-    return std::complex<double>(chosen.real(), std::abs(chosen.imag()));
+    return side < 0 ? -principal : principal;
   };
   return checked(internal::modes_from_schur_form(projection, factor, options, root), rank,
                  spectrum.sigma(0) / spectrum.sigma(rank - 1));
@@ -94,45 +93,45 @@ std::optional<BackgroundModes> total_modes(const SnapshotFactor<double>& factor,
                  largest / smallest);
 }
 
-// |X P_E|^2 for the projection P_E on the rows of E, and the coefficients E^+ (m x P) of the best
-// modes. `gram`: the complex part of X^H X, which is all that a trace of complex forms sees.
+// |X P_E|^2 for the projection P_E on the rows of E, E_pt = exp(q_p t), and the coefficients E^+
+// (m x P) of the best modes. Each q_p is a whole quaternion: phi lambda^t b = (phi b) (b^-1 lambda
+// b)^t, so that its direction is what an amplitude b says.
 class ExponentialFit {
  public:
-  ExponentialFit(const Matrix& r)
-      : gram_(r.a.adjoint() * r.a + (r.b.adjoint() * r.b).conjugate()) {}
+  explicit ExponentialFit(const Matrix& r) : gram_(r.conjugate_transpose() * r) {}
 
-  // logs: P pairs of real and imaginary part of ln lambda.
+  // logs: four parts of each q_p.
   double explained(const Eigen::VectorXd& logs) const {
-    const Eigen::MatrixXcd e = rows(logs);
-    const Eigen::LLT<Eigen::MatrixXcd> normal(e * e.adjoint());
-    if (normal.info() != Eigen::Success) return -1;
-    const Eigen::MatrixXcd q = normal.matrixL().solve(e);
-    const double value = (q * gram_ * q.adjoint()).trace().real();
+    const Matrix e = rows(logs), e_h = e.conjugate_transpose();
+    const double value = (inverse(e * e_h) * (e * (gram_ * e_h))).a.trace().real();
     return std::isfinite(value) ? value : -1;
   }
-  Eigen::MatrixXcd coefficients(const Eigen::VectorXd& logs) const {
-    const Eigen::MatrixXcd e = rows(logs);
-    return Eigen::LLT<Eigen::MatrixXcd>(e * e.adjoint()).solve(e).adjoint();
+  Matrix coefficients(const Eigen::VectorXd& logs) const {
+    const Matrix e = rows(logs), e_h = e.conjugate_transpose();
+    return e_h * inverse(e * e_h);
+  }
+  static Quaterniond log_of(const Eigen::VectorXd& logs, Index p) {
+    return {logs(4 * p), logs(4 * p + 1), logs(4 * p + 2), logs(4 * p + 3)};
   }
 
  private:
-  // lambda_p^t in units of its length, which changes no projection.
-  Eigen::MatrixXcd rows(const Eigen::VectorXd& logs) const {
-    const Index modes = logs.size() / 2, m = gram_.rows();
-    Eigen::MatrixXcd e(modes, m);
+  // Growing rows count from the last frame, which changes no projection.
+  Matrix rows(const Eigen::VectorXd& logs) const {
+    const Index modes = logs.size() / 4, m = gram_.rows();
+    Matrix e(modes, m);
     for (Index p = 0; p < modes; ++p) {
-      const std::complex<double> log(logs(2 * p), logs(2 * p + 1));
-      const double reference = log.real() > 0 ? static_cast<double>(m - 1) : 0;
-      for (Index t = 0; t < m; ++t) e(p, t) = std::exp(log * (static_cast<double>(t) - reference));
+      const Quaterniond log = log_of(logs, p);
+      const double reference = log.w > 0 ? static_cast<double>(m - 1) : 0;
+      for (Index t = 0; t < m; ++t) e.set(p, t, exp(log * (static_cast<double>(t) - reference)));
     }
     return e;
   }
 
-  Eigen::MatrixXcd gram_;
+  Matrix gram_;
 };
 
 // Newton's method for the largest explained(), damped as Levenberg and Marquardt do, with central
-// differences: 2P unknowns, of which there are few.
+// differences: 4P unknowns, of which there are few.
 Eigen::VectorXd fitted(const ExponentialFit& fit, Eigen::VectorXd logs, double frames) {
   constexpr int kMostSteps = 40;
   const Index size = logs.size();
@@ -181,29 +180,24 @@ BackgroundModes optimized_modes(const SnapshotFactor<double>& factor, const DmdO
   BackgroundModes modes = reduced_qdmd(factor, options);
   const Index count = modes.eigenvalues.size(), m = factor.r.cols();
   if (count == 0) return modes;
-  Eigen::VectorXd logs(2 * count);
+  Eigen::VectorXd logs(4 * count);
   for (Index p = 0; p < count; ++p) {
     // A mode that is gone after a frame has no exponential.
     if (!(std::abs(modes.eigenvalues(p)) > 1e-3)) return modes;
-    const std::complex<double> log = std::log(modes.eigenvalues(p));
-    logs(2 * p) = log.real();
-    logs(2 * p + 1) = log.imag();
+    const Quaterniond b = modes.amplitudes.get(p, 0).unit();
+    const Quaterniond start = b.conj() * log(Quaterniond(modes.eigenvalues(p))) * b;
+    logs.segment<4>(4 * p) << start.w, start.x, start.y, start.z;
   }
   const ExponentialFit fit(factor.r);
   if (!(fit.explained(logs) >= 0)) return modes;
   logs = fitted(fit, logs, static_cast<double>(m));
   BackgroundModes result = modes;
   const auto coefficients = fit.coefficients(logs);
+  result.combination = coefficients;
   for (Index p = 0; p < count; ++p) {
-    auto lambda = std::exp(std::complex<double>(logs(2 * p), logs(2 * p + 1)));
-    result.combination.a.col(p) = coefficients.col(p);
-    result.combination.b.col(p).setZero();
-    // j turns a mode with the conjugate eigenvalue into the standard one: phi j lambda (-j).
-    if (lambda.imag() < 0) {
-      lambda = std::conj(lambda);
-      result.combination.scale_col(p, Quaterniond(0, 0, 1, 0));
-    }
-    result.eigenvalues(p) = lambda;
+    const Quaterniond value = exp(ExponentialFit::log_of(logs, p));
+    result.combination.scale_col(p, standardizing_rotation(value));
+    result.eigenvalues(p) = {value.w, value.vector_norm()};
   }
   fit_to_window(&result, factor.r * result.combination, factor.r);
   const double residual = modes.summary.residual;

@@ -9,6 +9,7 @@ namespace qdmd {
 //
 // forward_backward (Dawson et al. 2016): the eigenvectors of A_f A_b^-1, and the roots of its
 // eigenvalues that lie as those of A_f do; A_f = Q~, A_b the same of time turned back.
+// Where lambda and -lambda are both eigenvalues, their modes are mixed.
 // total (Hemati et al. 2017): X and Y times the projection on the leading right singular vectors
 // of [X; Y], then as the paper.
 // Both are the paper's own at full rank, where nothing is left out: rank 0 means 1 for them.

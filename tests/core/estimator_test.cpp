@@ -79,21 +79,6 @@ TEST(Estimator, TurningColoursKeepTheirAngle) {
   }
 }
 
-// The root of an eigenvalue has two signs: pictures that alternate are not a still one.
-TEST(Estimator, ForwardBackwardKeepsTheSideOfAlternatingPictures) {
-  std::mt19937 rng(93);
-  const auto a = random_picture(40, rng), b = random_picture(40, rng);
-  Clip clip(40, 0);
-  for (int t = 0; t < 5; ++t) clip.frames.insert(clip.frames.end(), {a, b});
-  DmdOptions options;
-  options.rank = 2;
-  options.omega_threshold = kInfinity;
-  const auto modes = solve(clip, options, Estimator::forward_backward);
-  ASSERT_EQ(modes.eigenvalues.size(), 2);
-  EXPECT_LE(std::abs(modes.eigenvalues(0) - 1.0), 1e-9);
-  EXPECT_LE(std::abs(modes.eigenvalues(1) + 1.0), 1e-9);
-}
-
 // The noise that shrinks |lambda| of the paper's estimate: seeds' mean and its standard error.
 TEST(Estimator, NoiseBendsTheOthersLess) {
   constexpr int kSeeds = 12;
