@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "gst/videoview.h"
+
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
 
@@ -27,7 +29,7 @@ void BackgroundSample::forget() {
   newer_ = false;
 }
 
-BufferPtr BackgroundSample::make(Engine& engine, FrameIo& io) const {
+BufferPtr BackgroundSample::make(Engine& engine) const {
   // GStreamer's own allocator ends the process where there is no memory.
   const gsize size = GST_VIDEO_INFO_SIZE(&info_);
   gpointer memory = g_try_malloc0(size);
@@ -38,8 +40,7 @@ BufferPtr BackgroundSample::make(Engine& engine, FrameIo& io) const {
   {
     MappedVideoFrame frame(&info_, buffer.get(), GST_MAP_WRITE);
     if (!frame) return nullptr;
-    io.write(&frame, Output::background,
-             [&](const MutableImageView& view) { written = engine.write_background(view); });
+    written = engine.write_background(frame.view<uint8_t>());
   }
   if (!written) return nullptr;
   GST_BUFFER_PTS(buffer.get()) = timestamp_;
@@ -47,10 +48,10 @@ BufferPtr BackgroundSample::make(Engine& engine, FrameIo& io) const {
   return buffer;
 }
 
-GstSample* BackgroundSample::get(Engine& engine, FrameIo& io) {
+GstSample* BackgroundSample::get(Engine& engine) {
   if (newer_) {
     try {
-      if (const BufferPtr buffer = make(engine, io)) {
+      if (const BufferPtr buffer = make(engine)) {
         sample_.reset(gst_sample_new(buffer.get(), caps_.get(), &segment_, nullptr));
         newer_ = false;
       }

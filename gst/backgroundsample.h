@@ -4,7 +4,6 @@
 #include <gst/video/video.h>
 
 #include "core/engine/engine.h"
-#include "gst/frameio.h"
 #include "gst/pointers.h"
 
 namespace qdmd {
@@ -18,18 +17,18 @@ class BackgroundSample {
   void solved(const GstSegment& segment, GstClockTime timestamp, GstClockTime duration);
   // The newest background. It is made now where the engine has a newer one than the last. Null
   // before the first solve, and where there is no memory for it.
-  GstSample* get(Engine& engine, FrameIo& io);
+  GstSample* get(Engine& engine);
   // The engine is about to forget its background: the picture of it stays. After an error, which
   // makes it forget at once, the picture is the last that somebody asked for.
-  void keep(Engine& engine, FrameIo& io) {
-    SamplePtr(get(engine, io));
+  void keep(Engine& engine) {
+    SamplePtr(get(engine));
     newer_ = false;
   }
   // Null until the next solve.
   void forget();
 
  private:
-  BufferPtr make(Engine& engine, FrameIo& io) const;
+  BufferPtr make(Engine& engine) const;
 
   GstVideoInfo info_ = {};
   CapsPtr caps_;

@@ -51,8 +51,10 @@ constexpr guint kLoadLocationProperty = qdmd::kFirstFreeProperty,
                 kStatsProperty = qdmd::kFirstFreeProperty + 1,
                 kBackgroundProperty = qdmd::kFirstFreeProperty + 2;
 
-#define QDMD_FORMATS \
-  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, GRAY8 }"
+#define QDMD_FORMATS                                                                          \
+  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, YV12, NV21, " \
+  "Y42B, "                                                                                    \
+  "NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8 }"
 
 }  // namespace
 
@@ -136,7 +138,7 @@ static void gst_qdmd_background_get_property(GObject* object, guint id, GValue* 
   GST_OBJECT_UNLOCK(object);
   if (id == kBackgroundProperty) {
     const std::lock_guard lock(state->engine_lock);
-    g_value_take_boxed(value, state->background.get(state->engine, state->io));
+    g_value_take_boxed(value, state->background.get(state->engine));
     known = true;
   }
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);

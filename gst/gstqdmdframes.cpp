@@ -1,6 +1,7 @@
 #include "gst/gstqdmdframes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <new>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdlearnt.h"
+#include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 #define GST_CAT_DEFAULT qdmd_background_debug
@@ -81,7 +83,7 @@ static void forget_frames(GstQdmdBackground* self) {
 void drop_frames(GstQdmdBackground* self) {
   State* state = self->state;
   const std::lock_guard lock(state->engine_lock);
-  state->background.keep(state->engine, state->io);
+  state->background.keep(state->engine);
   state->engine.flush();
   forget_frames(self);
 }
@@ -94,7 +96,6 @@ void close(GstQdmdBackground* self) {
   state->regions = {};
   const std::lock_guard lock(state->engine_lock);
   state->engine.close();
-  state->io.clear();
 }
 
 // Copies what others may want to know of the engine.
@@ -157,6 +158,21 @@ static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
                              GST_OBJECT(self), make_solve_message(state->engine.report(), counters,
                                                                   GST_BASE_TRANSFORM(self)->segment,
                                                                   time.timestamp, time.duration)));
+}
+
+// Says that the frame of that time, or one a few frames before it, began another scene.
+static void tell_of_scene(GstQdmdBackground* self, GstClockTime timestamp) {
+  State* state = self->state;
+  const guint64 scenes = state->engine.scenes();
+  if (scenes > state->scenes_told) {
+    GST_INFO_OBJECT(self, "another scene: learning begins anew");
+    gst_element_post_message(
+        GST_ELEMENT(self),
+        gst_message_new_element(GST_OBJECT(self),
+                                make_scene_message(GST_BASE_TRANSFORM(self)->segment, timestamp)));
+  }
+  // An engine that is configured anew counts anew.
+  state->scenes_told = scenes;
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -237,8 +253,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       engine.set_mask_softness(settings.engine.mask_softness);
       engine.set_ignored(ignored_of(settings, shell.get()));
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
-      state->io.write(&frame, settings.output,
-                      [&](const MutableImageView& view) { engine.pop(settings.output, view); });
+      engine.pop(settings.output, frame.view<uint8_t>());
       note_solve(self, shell.get());
       return Status();
     });
@@ -351,12 +366,12 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   state->solves_told = 0;
   EngineOptions options = settings.engine;
   options.colours = colours_of(info);
-  options.caller_bytes = FrameIo::bytes(info);
+  options.levels = levels_of(info);
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
   const bool configured = with_engine(self, [&](Engine& engine) {
-    state->background.keep(engine, state->io);
+    state->background.keep(engine);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     const Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
@@ -420,6 +435,15 @@ static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, GstC
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
+// Of the frames as they come; 0: never.
+static gint64 absorb_frames(GstQdmdBackground* self, double seconds) {
+  if (seconds <= 0) return 0;
+  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
+  const double rate =
+      self->state->latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
+  return gint64(std::clamp(std::round(seconds * rate), 1.0, 1e12));
+}
+
 GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   State* state = self->state;
   // The base class asks for frames until there is none, or until downstream refuses one (it has
@@ -451,8 +475,9 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
       engine.set_threads(settings.engine.threads);
       engine.set_time_budget(settings.time_budget / 1000);
       engine.set_masks_expected(masks);
+      engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
-      const Status status = engine.push(state->io.read(frame));
+      const Status status = engine.push(frame.view<const uint8_t>());
       note_solve(self, nullptr);
       return status;
     });
@@ -462,6 +487,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
     }
   }
   publish_report(self, 1, 0);
+  tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
   tell_of_solve(self, nullptr);
   follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;

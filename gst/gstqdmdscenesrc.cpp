@@ -41,6 +41,7 @@
 
 #include "core/scene/scene.h"
 #include "gst/scenewriter.h"
+#include "gst/sceneyuv.h"
 #include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_STATIC(qdmd_scene_src_debug);
@@ -51,7 +52,9 @@ namespace {
 using qdmd::MappedVideoFrame;
 using namespace qdmd::scene;
 
-#define QDMD_FORMATS "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR }"
+#define QDMD_FORMATS                                                                           \
+  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, I420, NV12, Y42B, YUY2, Y444, " \
+  "I420_10LE, P010_10LE, GRAY8 }"
 
 constexpr gint kWidth = 320, kHeight = 240, kRate = 25;
 
@@ -73,6 +76,7 @@ struct Private {
   Settings playing;
   std::vector<NamedEffect> effects;
   std::optional<Scene> scene;
+  std::optional<qdmd::SceneYuv> yuv;  // where the format is not of R, G and B
   GstVideoInfo info;
   std::optional<GstSegment> pending;  // a seek that came before the caps
   gint64 index = 0;                   // of the next frame
@@ -211,35 +215,58 @@ static bool has_ended(const Private* priv, const GstSegment& segment) {
   return GST_CLOCK_TIME_IS_VALID(segment.stop) && time_of(priv, priv->index) >= segment.stop;
 }
 
+static void write_colours(Private* priv, const Picture& picture, MappedVideoFrame* frame) {
+  if (!priv->yuv) {
+    qdmd::write_picture(picture, frame->view<uint8_t>());
+    return;
+  }
+  priv->yuv->write(&frame->frame(), [&](int y) { return picture.row(y); });
+}
+
+// The scene's labels, each as a level of grey.
+static void write_greys(Private* priv, uint8_t (*level_of)(uint8_t), MappedVideoFrame* frame) {
+  const Plane& labels = priv->scene->labels();
+  if (!priv->yuv) {
+    qdmd::write_grey(labels, frame->view<uint8_t>(), level_of);
+    return;
+  }
+  std::vector<uint8_t> greys(3 * labels.row_bytes());
+  priv->yuv->write(&frame->frame(), [&](int y) {
+    for (size_t i = 0; i < greys.size(); ++i) greys[i] = level_of(labels.row(y)[i / 3]);
+    return greys.data();
+  });
+}
+
 static GstFlowReturn gst_qdmd_scene_src_fill(GstPushSrc* source, GstBuffer* buffer) {
   GstQdmdSceneSrc* self = GST_QDMD_SCENE_SRC(source);
   Private* priv = self->priv;
   if (!priv->scene) return GST_FLOW_NOT_NEGOTIATED;
   if (has_ended(priv, GST_BASE_SRC(source)->segment)) return GST_FLOW_EOS;
+  // Odd sizes are rounded up in memory: equal pictures are equal files.
+  if (priv->yuv) gst_buffer_memset(buffer, 0, 0, gst_buffer_get_size(buffer));
   {
-    const MappedVideoFrame frame(&priv->info, buffer, GST_MAP_WRITE);
+    MappedVideoFrame frame(&priv->info, buffer, GST_MAP_WRITE);
     if (!frame) {
       GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
       return GST_FLOW_ERROR;
     }
     const bool made = guarded(self, [&] {
-      const auto view = frame.view<uint8_t>();
       switch (priv->playing.truth) {
         case TRUTH_NONE:
           priv->scene->render(priv->index, kFrame);
-          qdmd::write_picture(priv->scene->frame(), view);
+          write_colours(priv, priv->scene->frame(), &frame);
           break;
         case TRUTH_BACKGROUND:
           priv->scene->render(priv->index, kTruth);
-          qdmd::write_picture(priv->scene->background(), view);
+          write_colours(priv, priv->scene->background(), &frame);
           break;
         case TRUTH_MASK:
           priv->scene->render(priv->index, kLabels);
-          qdmd::write_mask(priv->scene->labels(), view);
+          write_greys(priv, qdmd::mask_level, &frame);
           break;
         case TRUTH_LABELS:
           priv->scene->render(priv->index, kLabels);
-          qdmd::write_labels(priv->scene->labels(), view);
+          write_greys(priv, qdmd::label_level, &frame);
           break;
       }
     });
@@ -350,6 +377,8 @@ static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
         double(GST_VIDEO_INFO_FPS_N(&info)) / double(GST_VIDEO_INFO_FPS_D(&info));
     options.seed = priv->playing.seed;
     priv->scene.emplace(options, priv->effects);
+    priv->yuv.reset();
+    if (!GST_VIDEO_INFO_IS_RGB(&info)) priv->yuv.emplace(info);
     if (priv->pending && !locate(priv, *priv->pending))
       throw std::invalid_argument(
           "Backwards needs an end: seek with a stop position, or give the scene a length.");

@@ -185,6 +185,15 @@ const Property kProperties[] = {
      },
      QDMD_DOUBLE(s.time_budget)},
     {[](const Settings& d) {
+       return g_param_spec_double(
+           "absorb-time", "Time to absorb",
+           "Seconds that something which came and stands still is foreground "
+           "before it becomes background (0: it never does); what leaves is "
+           "known at once (not used by method=qdmd and dmd)",
+           0, 1e6, d.absorb_time, kAnyTime);
+     },
+     QDMD_DOUBLE(s.absorb_time)},
+    {[](const Settings& d) {
        return g_param_spec_enum("shadows", "Shadows",
                                 "What masks make of the background in another light: shadows, and "
                                 "floors that mirror",

@@ -16,6 +16,7 @@ struct Settings {
   bool freeze = false, post_messages = false, regions = false;
   int regions_min_area = 0;  // pixels
   double time_budget = 0;    // milliseconds a frame; 0: no limit
+  double absorb_time = 300;  // seconds; 0: never
   IgnoredAreas ignored;
   GQuark ignored_type = 0;  // of regions of interest that are ignored, too; 0: none
   EngineOptions engine;

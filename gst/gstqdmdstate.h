@@ -11,7 +11,6 @@
 #include "core/foreground/regions.h"
 #include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
-#include "gst/frameio.h"
 #include "gst/gstqdmdbackground.h"
 #include "gst/gstqdmdsettings.h"
 #include "gst/latency.h"
@@ -41,7 +40,6 @@ struct State {
   std::mutex engine_lock;
   // Protected by the engine lock.
   Engine engine;
-  FrameIo io;
   BackgroundSample background;
   Colours colours = Colours::rgb;  // of the video that the engine is configured for
   std::unique_ptr<Loaded> loaded;
@@ -52,8 +50,8 @@ struct State {
   BufferQueue shells;
   std::vector<guint8> mask, residual;  // for regions
   RegionFinder regions;
-  guint64 solves_told = 0;  // of the engine's
-  guint breaks = 0;         // in time, one after another, with a frame between them
+  guint64 solves_told = 0, scenes_told = 0;  // of the engine's
+  guint breaks = 0;  // in time, one after another, with a frame between them
   bool warned_of_breaks = false;
   guint warned = 0;                             // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected

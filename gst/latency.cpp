@@ -25,6 +25,12 @@ bool Latency::configure(guint64 frames, gint rate_n, gint rate_d) {
   return promised_ != before;
 }
 
+double Latency::rate(gint rate_n, gint rate_d) const {
+  if (intervals_ > kFirstLook && newest_ > first_)
+    return double(intervals_ - 1) * double(GST_SECOND) / double(newest_ - first_);
+  return rate_n > 0 && rate_d > 0 ? double(rate_n) / double(rate_d) : double(kAssumedRate);
+}
+
 bool Latency::promise(GstClockTime latency) {
   latency = std::min(latency, kMost);
   if (frames_ == 0 || latency <= promised_) return false;

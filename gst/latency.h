@@ -21,6 +21,9 @@ class Latency {
     intervals_ = 0;
     first_ = newest_ = GST_CLOCK_TIME_NONE;
   }
+  // Frames per second: of the frames since the last break, where they have timestamps, else of the
+  // caps (unknown: 0/1).
+  double rate(gint rate_n, gint rate_d) const;
   GstClockTime promised() const { return promised_; }
   // To a LATENCY query whose answer from upstream is `min` to `max` (GST_CLOCK_TIME_NONE: any), the
   // answer to downstream.

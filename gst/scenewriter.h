@@ -38,6 +38,11 @@ inline void write_picture(const scene::Picture& picture, const MutableImageView&
   clear_padding(view);
 }
 
+// What a mask and labels are in R, G and B: white where the label is that of an object, else black;
+// and the label itself.
+inline uint8_t mask_level(uint8_t label) { return label == scene::kObjectLabel ? 255 : 0; }
+inline uint8_t label_level(uint8_t label) { return label; }
+
 // Grey of a level that follows from the label.
 template <typename LevelOf>
 void write_grey(const scene::Plane& labels, const MutableImageView& view, LevelOf level_of) {
@@ -52,16 +57,6 @@ void write_grey(const scene::Plane& labels, const MutableImageView& view, LevelO
     }
   }
   clear_padding(view);
-}
-
-// White where the label is that of an object, else black.
-inline void write_mask(const scene::Plane& labels, const MutableImageView& view) {
-  write_grey(labels, view,
-             [](uint8_t label) -> uint8_t { return label == scene::kObjectLabel ? 255 : 0; });
-}
-
-inline void write_labels(const scene::Plane& labels, const MutableImageView& view) {
-  write_grey(labels, view, [](uint8_t label) { return label; });
 }
 
 }  // namespace qdmd

@@ -3,6 +3,19 @@
 #include "gst/gstqdmdenums.h"
 
 namespace qdmd {
+namespace {
+
+// A timestamp as applications go by it.
+struct FrameTimes {
+  FrameTimes(const GstSegment& segment, GstClockTime timestamp) {
+    if (segment.format != GST_FORMAT_TIME || !GST_CLOCK_TIME_IS_VALID(timestamp)) return;
+    stream = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, timestamp);
+    running = gst_segment_to_running_time(&segment, GST_FORMAT_TIME, timestamp);
+  }
+  guint64 stream = GST_CLOCK_TIME_NONE, running = GST_CLOCK_TIME_NONE;
+};
+
+}  // namespace
 
 GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
   GstStructure* stats = gst_structure_new(
@@ -33,17 +46,20 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
   return stats;
 }
 
+GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp) {
+  const FrameTimes times(segment, timestamp);
+  return gst_structure_new("qdmdbackground-scene", "timestamp", G_TYPE_UINT64, guint64(timestamp),
+                           "stream-time", G_TYPE_UINT64, times.stream, "running-time",
+                           G_TYPE_UINT64, times.running, nullptr);
+}
+
 GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,
                                  const GstSegment& segment, GstClockTime timestamp,
                                  GstClockTime duration) {
-  guint64 stream_time = GST_CLOCK_TIME_NONE, running_time = GST_CLOCK_TIME_NONE;
-  if (segment.format == GST_FORMAT_TIME && GST_CLOCK_TIME_IS_VALID(timestamp)) {
-    stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, timestamp);
-    running_time = gst_segment_to_running_time(&segment, GST_FORMAT_TIME, timestamp);
-  }
+  const FrameTimes times(segment, timestamp);
   return gst_structure_new(
       "qdmdbackground", "timestamp", G_TYPE_UINT64, guint64(timestamp), "stream-time",
-      G_TYPE_UINT64, stream_time, "running-time", G_TYPE_UINT64, running_time, "duration",
+      G_TYPE_UINT64, times.stream, "running-time", G_TYPE_UINT64, times.running, "duration",
       G_TYPE_UINT64, guint64(duration), "window-frames", G_TYPE_UINT, guint(report.window_frames),
       "rank", G_TYPE_UINT, guint(report.dmd.rank), "lambda-real", G_TYPE_DOUBLE,
       report.dmd.lambda.real(), "lambda-imaginary", G_TYPE_DOUBLE, report.dmd.lambda.imag(),

@@ -23,4 +23,7 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
                                  const GstSegment& segment, GstClockTime timestamp,
                                  GstClockTime duration);
 
+// The element message of another scene, noticed with the frame of that timestamp.
+GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp);
+
 }  // namespace qdmd

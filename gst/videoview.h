@@ -7,8 +7,36 @@
 #include <utility>
 
 #include "core/base/image_view.h"
+#include "core/base/levels.h"
 
 namespace qdmd {
+
+// What black, white and neutral chroma are in video of 8 bits, full or limited range as the caps
+// say. Where they do not say it, Y, U and V are of limited range.
+inline Levels levels_of(const GstVideoInfo& info) {
+  const bool yuv = GST_VIDEO_INFO_IS_YUV(&info);
+  GstVideoColorRange range = info.colorimetry.range;
+  if (range == GST_VIDEO_COLOR_RANGE_UNKNOWN)
+    range = yuv ? GST_VIDEO_COLOR_RANGE_16_235 : GST_VIDEO_COLOR_RANGE_0_255;
+  gint offset[GST_VIDEO_MAX_COMPONENTS], scale[GST_VIDEO_MAX_COMPONENTS];
+  gst_video_color_range_offsets(range, info.finfo, offset, scale);
+  Levels levels;
+  for (int c = 0; c < 3; ++c) {
+    const int from = GST_VIDEO_INFO_IS_GRAY(&info) ? 0 : c;
+    levels.black[c] = static_cast<uint8_t>(offset[from]);
+    levels.white[c] = static_cast<uint8_t>(offset[from] + (yuv && c > 0 ? 0 : scale[from]));
+  }
+  return levels;
+}
+
+// The first sample of a component. GStreamer 1.22 has V of P010 one byte behind U, which is in the
+// middle of it.
+inline guint8* component_data(const GstVideoFrame& frame, int component) {
+  const int offset = GST_VIDEO_FRAME_COMP_POFFSET(&frame, component);
+  const bool wide = GST_VIDEO_FRAME_COMP_DEPTH(&frame, component) > 8;
+  return static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&frame, component)) +
+         (wide && offset % 2 == 1 ? offset : 0);
+}
 
 // Maps a buffer for as long as it lives. The map is released before the buffer is handed on.
 class MappedVideoFrame {
@@ -26,34 +54,40 @@ class MappedVideoFrame {
   const GstVideoFrame& frame() const { return frame_; }
   GstVideoFrame& frame() { return frame_; }
 
-  // True where view() can show the frame: packed R, G, B of 3 or 4 bytes a pixel, planes of R, G, B
-  // with one stride, and grey, whose samples are all three channels.
-  bool has_view() const {
-    const auto& info = frame_.info;
-    if (GST_VIDEO_INFO_IS_GRAY(&info)) return true;
-    return GST_VIDEO_INFO_IS_RGB(&info) &&
-           GST_VIDEO_FRAME_COMP_STRIDE(&frame_, 1) == GST_VIDEO_FRAME_COMP_STRIDE(&frame_, 0) &&
-           GST_VIDEO_FRAME_COMP_STRIDE(&frame_, 2) == GST_VIDEO_FRAME_COMP_STRIDE(&frame_, 0);
-  }
-  // The fourth byte of packed formats without alpha is no component of GStreamer's: it is where the
-  // three others are not.
+  // The samples where they are. Of grey all three channels are the same ones. The fourth byte of
+  // packed formats without alpha is no component of GStreamer's: it is where the three others are
+  // not.
   template <typename Byte>
   BasicImageView<Byte> view() const {
     BasicImageView<Byte> view;
-    int fourth = 0 + 1 + 2 + 3;
-    for (int c = 0; c < 3; ++c) {
-      const int component = std::min<int>(c, GST_VIDEO_FRAME_N_COMPONENTS(&frame_) - 1);
-      view.channel[c] = static_cast<Byte*>(GST_VIDEO_FRAME_COMP_DATA(&frame_, component));
-      fourth -= GST_VIDEO_FRAME_COMP_POFFSET(&frame_, component);
-    }
-    view.pixel_stride = GST_VIDEO_FRAME_COMP_PSTRIDE(&frame_, 0);
-    view.row_stride = GST_VIDEO_FRAME_COMP_STRIDE(&frame_, 0);
-    if (view.pixel_stride == 4) {
-      view.alpha = static_cast<Byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0)) + fourth;
-      view.alpha_is_padding = !GST_VIDEO_INFO_HAS_ALPHA(&frame_.info);
-    }
     view.width = GST_VIDEO_FRAME_WIDTH(&frame_);
     view.height = GST_VIDEO_FRAME_HEIGHT(&frame_);
+    const bool alpha = GST_VIDEO_INFO_HAS_ALPHA(&frame_.info);
+    const int components = GST_VIDEO_FRAME_N_COMPONENTS(&frame_);
+    bool even = true;
+    Spacing first;
+    for (int c = 0; c < 3 + alpha; ++c) {
+      const int component = std::min(c, components - 1);
+      Byte* const data = component_data(frame_, component);
+      (c < 3 ? view.channel[c] : view.alpha) = data;
+      const auto* format = frame_.info.finfo;
+      view.own[c] = {GST_VIDEO_FRAME_COMP_PSTRIDE(&frame_, component),
+                     GST_VIDEO_FRAME_COMP_STRIDE(&frame_, component),
+                     1 << GST_VIDEO_FORMAT_INFO_W_SUB(format, component),
+                     1 << GST_VIDEO_FORMAT_INFO_H_SUB(format, component)};
+      if (c == 0) first = view.own[0];
+      even = even && view.own[c] == first;
+    }
+    if (!even) return view;
+    for (Spacing& own : view.own) own = {};
+    view.pixel_stride = first.pixel_stride;
+    view.row_stride = first.row_stride;
+    if (first.pixel_stride == 4 && !alpha) {
+      int fourth = 0 + 1 + 2 + 3;
+      for (int c = 0; c < 3; ++c) fourth -= GST_VIDEO_FRAME_COMP_POFFSET(&frame_, c);
+      view.alpha = static_cast<Byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0)) + fourth;
+      view.alpha_is_padding = true;
+    }
     return view;
   }
 

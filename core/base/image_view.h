@@ -6,16 +6,39 @@
 
 namespace qdmd {
 
-// 8-bit R, G, B and perhaps A samples at a fixed pixel and row distance, so that one type covers
-// every packed or planar layout with any padding. Pointers are to the first sample of each channel.
+// How the samples of one channel lie: that of pixel (x, y) is y / rows * row_stride +
+// x / columns * pixel_stride bytes from its first one.
+struct Spacing {
+  ptrdiff_t pixel_stride = 0, row_stride = 0;  // bytes
+  int columns = 1, rows = 1;                   // of pixels that share a sample: 1 or 2
+
+  bool operator==(const Spacing&) const = default;
+};
+
+// 8-bit samples of three channels (R, G, B or Y, U, V) and perhaps of alpha: one type covers every
+// packed, planar or half-planar layout with any padding. Pointers are to the first sample of each
+// channel. In Y, U and V each chroma sample stands for the pixels that share it.
 template <typename Byte>
 struct BasicImageView {
-  Byte* channel[3] = {nullptr, nullptr, nullptr};  // R, G, B
-  Byte* alpha = nullptr;                           // null: the format has none
+  Byte* channel[3] = {nullptr, nullptr, nullptr};
+  Byte* alpha = nullptr;  // null: the format has none
   // True: samples at `alpha` are padding; they are not read and are written as 255.
   bool alpha_is_padding = false;
   int width = 0, height = 0;
+  // Of all channels and alpha that have none of their own.
   ptrdiff_t pixel_stride = 0, row_stride = 0;  // bytes
+  // Of channels 0 to 2 and of alpha (3), where its pixel_stride is not 0.
+  Spacing own[4];
+
+  Spacing spacing(int c) const {
+    return own[c].pixel_stride != 0 ? own[c] : Spacing{pixel_stride, row_stride, 1, 1};
+  }
+  // All are at the same distances.
+  bool is_even() const {
+    for (const Spacing& spacing : own)
+      if (spacing.pixel_stride != 0) return false;
+    return true;
+  }
 };
 
 using ImageView = BasicImageView<const uint8_t>;

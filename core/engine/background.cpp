@@ -16,8 +16,28 @@ Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room
 void Background::forget() {
   learner_->forget();
   decision_.forget();
+  known_ = scene_begins_ = false;
+  state_ = State::learnt;
+}
+
+void Background::begin_scene() {
+  learner_->begin_scene();
+  scene_begins_ = true;
+}
+
+void Background::begin_scene_at_once() {
+  begin_scene();
   known_ = false;
   state_ = State::learnt;
+}
+
+void Background::return_to(const Learnt& learnt) {
+  begin_scene_at_once();
+  make_room();
+  recall(learnt);
+  show(learnt, State::held_in_light);
+  decision_.forget();
+  scene_begins_ = false;
 }
 
 void Background::remember(Learnt* learnt) const {
@@ -91,6 +111,7 @@ void Background::decide(const uint8_t* const x[3], Pool* pool) {
 void Background::publish() {
   newest_ = next();
   learner_->publish();
+  if (std::exchange(scene_begins_, false)) decision_.forget();
   report_ = next_report_;
   known_ = true;
   state_ = State::learnt;

@@ -37,6 +37,13 @@ class Background {
   Learner& learner() { return *learner_; }
   // Forgets the model and what earlier windows showed.
   void forget();
+  // Learner::begin_scene(); masks begin anew with the next publish().
+  void begin_scene();
+  // The same, and there is no background until then.
+  void begin_scene_at_once();
+  // The scene of what was learnt is back, and its background the one in use, in the light of each
+  // frame. Where it throws, nothing is known.
+  void return_to(const Learnt& learnt);
 
   // What is known, with the L of the time and light that the model is set to.
   void remember(Learnt* learnt) const;
@@ -74,8 +81,8 @@ class Background {
   void hold(double t, State state);
   // L is as it is until publish(), but held no longer.
   void learn() { state_ = State::learnt; }
-  // Learner::mend(): `newest` frames, the last of them at time t, against the L in use.
-  void mend(const SnapshotRange& newest, double t) { learner_->mend(newest, t, &model()); }
+  // Learner::mend(), of the L in use.
+  void mend(const Learner::Compared& frame) { learner_->mend(frame, &model()); }
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 
@@ -102,7 +109,7 @@ class Background {
   std::optional<SnapshotRange> snapshots_;  // of the next
   SolveReport report_, next_report_;
   State state_ = State::learnt;
-  bool known_ = false;
+  bool known_ = false, scene_begins_ = false;
   uint64_t solves_ = 0;
   MaskWishes wishes_;
 };

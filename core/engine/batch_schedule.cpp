@@ -27,6 +27,8 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (!frames().append(frame)) return false;
   ++queue->pending;
   ++collection_->not_added;
+  if (!collection_->freeze && scene_seen() != SceneSeen::same)
+    collection_->scene = std::max(collection_->begin, taken() - Learner::kSceneFrames);
   pace().count_frame();
   if (collected() == window_size_) {
     end_window(late_frames_ == 0);
@@ -82,23 +84,42 @@ void BatchSchedule::add_group() {
 // The window that is collected waits from now on, and is solved.
 void BatchSchedule::end_window(bool at_once) {
   const Collection window = *std::exchange(collection_, std::nullopt);
-  waiting_ = Stretch{window.begin, taken(), window.begin, window.state};
-  if (window.state != State::learnt) return;
+  waiting_ =
+      Stretch{window.begin, taken(), window.begin, window.scene ? State::learnt : window.state};
+  if (window.scene) begin_scene(window);
+  if (waiting_->state != State::learnt) return;
   wait();
   const auto count = static_cast<int>(taken() - window.begin);
-  const int size = static_cast<int>(std::min<int64_t>(
-      {window_size_, frames().size(), taken() - std::min(history_from_, window.begin)}));
+  const int64_t from = window.scene ? *window.scene : std::min(history_from_, window.begin);
+  const int size =
+      static_cast<int>(std::min<int64_t>({window_size_, frames().size(), taken() - from}));
   const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
   waiting_->time_zero = taken() - size;
   work_ = Work{span, count < size ? count : window.not_added, background().wishes()};
   // Reads how many frames there are.
   if (background().learner().in_one_piece()) background().begin(span);
-  if (!at_once) {
+  // Frames that leave before it need the model whose place it takes.
+  put_off_ = at_once && shown_.end > window.begin;
+  if (put_off_) return;
+  if (at_once)
+    solve_at_once();
+  else
     start([this] { solve(); });
-    return;
-  }
+}
+
+void BatchSchedule::solve_at_once() {
   hold_up();
   solve();
+}
+
+// Frames before it leave with the background before; what comes after knows nothing of them.
+void BatchSchedule::begin_scene(const Collection& window) {
+  wait();
+  background().begin_scene();
+  history_from_ = *window.scene;
+  if (shown_.end != window.begin) return;
+  shown_.hold_from = window.begin;
+  shown_.end = waiting_->begin = *window.scene;
 }
 
 void BatchSchedule::solve() {
@@ -115,6 +136,7 @@ void BatchSchedule::advance() {
   const Stretch next = *waiting_;
   if (next.state == State::learnt) {
     wait();
+    if (std::exchange(put_off_, false)) solve_at_once();
     background().publish();
   } else if (loaded_ && next.begin >= loaded_->from) {
     wait();
@@ -150,7 +172,7 @@ void BatchSchedule::restart() {
   waiting_.reset();
   collection_.reset();
   loaded_.reset();
-  break_ = false;
+  break_ = put_off_ = false;
   history_from_ = taken();
   shown_ = {taken(), taken(), taken()};
 }
@@ -173,8 +195,15 @@ void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
 void BatchSchedule::show(int index) {
   const int64_t frame = kept_from() + index;
   if (frame == shown_.end) advance();
+  const auto time = static_cast<double>(frame - shown_.time_zero);
+  if (frame >= shown_.hold_from && background().state() == State::learnt)
+    background().hold(background().report().window_frames - 1, State::held_in_light);
   if (background().state() == State::held_in_light) background().follow_light(frames().slot(index));
-  background().model().set_time(static_cast<double>(frame - shown_.time_zero));
+  if (background().state() == State::learnt) {
+    const int count = std::min(frames().size() - index, Learner::kMendingFrames);
+    background().mend({{frames().window(), index, count}, 0, frame, time});
+  }
+  background().model().set_time(time);
 }
 
 void BatchSchedule::show_newest() {

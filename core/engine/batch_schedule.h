@@ -34,6 +34,7 @@ class BatchSchedule : public Schedule {
     int64_t begin = 0, end = 0;
     int64_t time_zero = 0;  // the first snapshot of its model
     Background::State state = Background::State::learnt;
+    int64_t hold_from = INT64_MAX;  // frames that its window does not have
   };
   // The one that is collected.
   struct Collection {
@@ -41,7 +42,8 @@ class BatchSchedule : public Schedule {
     bool freeze = false;
     bool decided = false;  // what its state is
     Background::State state = Background::State::learnt;
-    int not_added = 0;  // newest frames whose inner products are not computed yet
+    int not_added = 0;                  // newest frames whose inner products are not computed yet
+    std::optional<int64_t> scene = {};  // the first frame of another scene
   };
   // Shown by the first window from frame `from` on, if that one is held.
   struct Loaded {
@@ -64,8 +66,10 @@ class BatchSchedule : public Schedule {
   void decide();
   void add_group();
   void end_window(bool at_once);
+  void begin_scene(const Collection& window);
   void end_early();
   void solve();
+  void solve_at_once();
   void advance();
 
   int window_size_, late_frames_;
@@ -76,6 +80,7 @@ class BatchSchedule : public Schedule {
   std::optional<Collection> collection_;
   std::optional<Loaded> loaded_;
   std::optional<Work> work_;
+  bool put_off_ = false;  // until the window's first frame leaves
 };
 
 }  // namespace qdmd

@@ -6,6 +6,7 @@
 
 #include "core/engine/batch_schedule.h"
 #include "core/engine/live_schedule.h"
+#include "core/foreground/picture.h"
 #include "core/passes/bands.h"
 #include "core/passes/residual.h"
 
@@ -51,6 +52,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       options.colours, options.steps);
   if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
+  background_->learner().set_absorb_frames(absorb_frames_);
   background_->decision().set_shadows(shadows_);
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
   if (live)
@@ -153,6 +155,11 @@ void Engine::set_threads(int threads) {
   if (workers_) workers_->ask_for(threads);
 }
 
+void Engine::set_absorb_frames(int64_t frames) {
+  absorb_frames_ = frames;
+  if (background_) background_->learner().set_absorb_frames(frames);
+}
+
 void Engine::set_shadows(Shadows shadows) {
   shadows_ = shadows;
   if (background_) background_->decision().set_shadows(shadows);
@@ -198,7 +205,7 @@ void Engine::soften(OutputTask* task) {
                    workers_->side().idle() ? &workers_->pool() : nullptr);
   task->mask = soft_mask_->alpha();
   task->soft = true;
-  if (options_.colours == Colours::yuv) task->black[0] = 16, task->black[1] = task->black[2] = 128;
+  std::copy_n(options_.levels.black, kChannels, task->black);
 }
 
 void Engine::foreground(uint8_t* mask, uint8_t* residual) {
@@ -222,7 +229,7 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
 bool Engine::write_background(const MutableImageView& out) {
   if (!configured() || !background_->known()) return false;
   schedule_->show_newest();
-  write_output(task_of(Output::background), out, 0, frames_.height());
+  write_picture(task_of(Output::background), options_.levels, out, 0, frames_.height());
   return true;
 }
 
@@ -268,14 +275,19 @@ void Engine::pop(Output output, const MutableImageView& out) {
       soften(&task);
     else if (soft_mask_)
       soft_mask_->forget();
-    const auto write = [&](int first, int count, size_t) { write_output(task, out, first, count); };
+    const int height = frames_.height(), together = rows_together(out);
+    const int steps = (height + together - 1) / together;
+    const auto write = [&](int first, int count, size_t) {
+      const int row = first * together;
+      write_picture(task, options_.levels, out, row, std::min(count * together, height - row));
+    };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
       const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
-                                            static_cast<size_t>(frames_.height()));
-      for_bands(workers_->pool(), frames_.height(), static_cast<int>(bands), write);
+                                            static_cast<size_t>(steps));
+      for_bands(workers_->pool(), steps, static_cast<int>(bands), write);
     } else {
-      write(0, frames_.height(), 0);
+      write(0, steps, 0);
     }
   });
   --queue_.pending;

@@ -72,6 +72,9 @@ class Engine {
   int frames_left() const { return schedule_ ? schedule_->frames_left(queue_) : 0; }
   // Frames pushed and not popped.
   int pending() const { return queue_.pending; }
+  // Scenes that began while frames came: the camera was moved, covered, or switched to another
+  // view. Learning then began anew. Method::robust only.
+  uint64_t scenes() const { return schedule_ ? schedule_->scenes() : 0; }
   uint64_t solves() const { return background_ ? background_->solves() : 0; }
   SolveReport report() const { return background_ ? background_->report() : SolveReport(); }
   // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies or a
@@ -92,6 +95,9 @@ class Engine {
   // time in which it learns, from its first window, what masks need; who asks all the same has
   // masks that learn as frames are decided. True unless it is set.
   void set_masks_expected(bool expected);
+  // Frames that something which came and stands still is foreground before it is background; 0: it
+  // never is. What leaves is known at once. Takes effect with the next frame. Method::robust only.
+  void set_absorb_frames(int64_t frames);
   // What masks make of pixels that only light tells from the background. Takes effect at once.
   void set_shadows(Shadows shadows);
   // While on, the background stays the picture that it was, and nothing is solved; only the first
@@ -123,6 +129,7 @@ class Engine {
   Clock clock_;
   Pace pace_{&clock_};
   bool freeze_ = false, masks_expected_ = true;
+  int64_t absorb_frames_ = 0;
   IgnoredAreas ignored_;
   Shadows shadows_ = Shadows::background;
   FrameStore frames_;

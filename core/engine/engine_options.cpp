@@ -54,7 +54,7 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks = Decision::bytes(width, height) + layout.soft_bytes;
   layout.bytes = saturating_sum(
-      saturating_sum(saturating_sum(layout.store_bytes, masks), options.caller_bytes),
+      saturating_sum(layout.store_bytes, masks),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
                     Workers::count(options.threads)));
   return layout;

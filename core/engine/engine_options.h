@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/base/levels.h"
 #include "core/base/status.h"
 #include "core/engine/live_plan.h"
 #include "core/foreground/decision.h"
@@ -22,11 +23,11 @@ struct EngineOptions : LearnOptions {
   int window_size = 100;                    // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;                         // frames between solves in live mode, up to m; 0: m / 4
   Colours colours = Colours::rgb;           // of the frames
+  Levels levels;                            // of the frames
   DecisionSteps steps;                      // of masks
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
   int mask_softness = 0;                    // pixels, Engine::set_mask_softness()
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
-  uint64_t caller_bytes = 0;                // that the caller takes beside, and that count, too
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
 

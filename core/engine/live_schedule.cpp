@@ -31,17 +31,37 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     begin_window(has_model);
   }
   if (!frames().append(frame)) return false;
+  if (!frozen) follow_scene();
   if (!frozen) begin_work();
   if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
-  if (background().state() == State::learnt && background().known())
-    background().mend(
-        SnapshotRange(frames().window()).newest(std::min(frames().size(), Learner::kMendingFrames)),
-        time());
-  if (background().solves() > solves) published_ = {time(), background().model().light()};
+  if (background().state() == State::learnt && background().known()) mend();
+  if (background().solves() > solves) published_ = {time(), background().model().light(time())};
   pace().count_frame();
   queue->pending = queue->ready = 1;
   return true;
+}
+
+// With the newest frame: what was known of a scene is kept for its return.
+void LiveSchedule::follow_scene() {
+  const SceneSeen seen = scene_seen();
+  if (seen == SceneSeen::same) return;
+  stop();
+  const bool returns = seen == SceneSeen::the_one_before && left_.has_value();
+  Learnt before;
+  background().remember(&before);
+  if (returns)
+    background().return_to(*left_);
+  else
+    background().begin_scene_at_once();
+  left_ = std::move(before);
+  begin_window(returns);
+}
+
+void LiveSchedule::mend() {
+  const int count = std::min(frames().size(), Learner::kMendingFrames);
+  background().mend({SnapshotRange(frames().window()).newest(count), count - 1,
+                     static_cast<int64_t>(frames().frames_taken()) - 1, time(), true});
 }
 
 // Publishes what is due.
@@ -135,6 +155,7 @@ void LiveSchedule::begin_window(bool has_model) {
 
 void LiveSchedule::restart() {
   stop();
+  left_.reset();
   frames().clear();
   begin_window(false);
 }

@@ -45,6 +45,8 @@ class LiveSchedule : public Schedule {
     Gain light = kSameLight;
   };
 
+  void follow_scene();
+  void mend();
   void settle();
   void begin_work();
   void run(bool at_once);
@@ -64,6 +66,7 @@ class LiveSchedule : public Schedule {
   std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
   std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
   MaskWishes wishes_;                 // as they were when the work began
+  std::optional<Learnt> left_;        // of the scene that the camera showed before
 };
 
 }  // namespace qdmd

@@ -44,6 +44,9 @@ class Schedule {
   void begin_push() { held_up_ = false; }
   // Work of a solve was done in the newest push(), or waited for.
   bool held_up() const { return held_up_; }
+  // How often frames showed another scene than the background (Learner::scene_of), so
+  // that learning began anew.
+  uint64_t scenes() const { return scenes_; }
   // All that waits becomes ready. The next frame begins a new window.
   virtual void drain(Queue* queue) = 0;
   // Drops the work that is under way, and all frames. The background is forgotten, too.
@@ -74,12 +77,21 @@ class Schedule {
     if (!side().idle()) hold_up();
     side().finish();
   }
+  // With the newest frame, which is taken in.
+  SceneSeen scene_seen() {
+    if (!background().known() || background().state() == Background::State::held)
+      return SceneSeen::same;
+    const SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    scenes_ += seen == SceneSeen::same ? 0 : 1;
+    return seen;
+  }
   // For work of a solve that is done at once.
   void hold_up() { held_up_ = true; }
 
  private:
   Stage stage_;
   bool held_up_ = false;
+  uint64_t scenes_ = 0;
 };
 
 }  // namespace qdmd

@@ -2,7 +2,9 @@
 
 #include <limits>
 
+#include "core/passes/chroma.h"
 #include "core/passes/planes.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -10,6 +12,16 @@ namespace {
 
 size_t pixels_of(int width, int height) {
   return static_cast<size_t>(width) * static_cast<size_t>(height);
+}
+
+ChromaShape shape_of(int width, int height, const FrameContents& contents) {
+  return {width, height, contents.chroma_columns, contents.chroma_rows};
+}
+
+// Samples of chroma that are spread to all pixels.
+size_t spread_size(int width, int height, const FrameContents& contents) {
+  const bool needed = contents.sample_step > 1 || contents.cells_along > 0;
+  return needed && contents.chroma_columns > 1 ? 2 * pixels_of(width, height) : 0;
 }
 
 // What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
@@ -25,7 +37,9 @@ FrameStore::FrameStore(int capacity, int width, int height, const FrameContents&
       height_(height),
       sample_step_(contents.sample_step),
       most_bytes_(most_bytes),
-      planes_(capacity, pixels_of(width, height)),
+      planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height, contents))
+                                          : Window(capacity, pixels_of(width, height))),
+      spread_(spread_size(width, height, contents)),
       constant_alpha_(static_cast<size_t>(capacity), 255),
       varies_(static_cast<size_t>(capacity), 0) {
   if (sample_step_ > 1) samples_ = PlaneSlots(capacity, sample_count(width, height, sample_step_));
@@ -36,8 +50,8 @@ FrameStore::FrameStore(int capacity, int width, int height, const FrameContents&
 }
 
 uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
-  uint64_t bytes = PlaneSlots::bytes(capacity, pixels_of(width, height));
-  uint64_t beside = 2 * static_cast<uint64_t>(capacity);
+  uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents));
+  uint64_t beside = 2 * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
   if (contents.sample_step > 1)
     beside += PlaneSlots::bytes(capacity, sample_count(width, height, contents.sample_step));
   if (contents.cells_along > 0)
@@ -48,19 +62,19 @@ uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameConte
 
 uint64_t FrameStore::bytes() const {
   return planes_.bytes() + samples_.bytes() + cells_.bytes() + (alpha_ ? alpha_bytes() : 0) +
-         constant_alpha_.size() + varies_.size();
+         spread_.size() + constant_alpha_.size() + varies_.size();
 }
 
 bool FrameStore::append(const ImageView& frame) {
   const int slot = planes_.append();
   ++frames_taken_;
-  uint8_t* const planes[3] = {planes_.plane(slot, 0), planes_.plane(slot, 1),
-                              planes_.plane(slot, 2)};
   const uint8_t alpha = first_alpha(frame);
-  const bool constant = split_channels(frame, 0, height_, alpha, planes);
+  const bool constant = take_planes(slot, frame, alpha);
   varies_[static_cast<size_t>(slot)] = !constant;
   constant_alpha_[static_cast<size_t>(slot)] = alpha;
   if (!constant && !keep_alpha(slot, frame)) return false;
+  const uint8_t* planes[3] = {};
+  if (sample_step_ > 1 || cells_.cells() > 0) read_planes(planes_, slot, spread_.data(), planes);
   if (sample_step_ > 1) {
     samples_.pad(slot);
     for (int c = 0; c < kChannels; ++c)
@@ -71,6 +85,23 @@ bool FrameStore::append(const ImageView& frame) {
   return true;
 }
 
+// True: every alpha sample is `alpha`.
+bool FrameStore::take_planes(int slot, const ImageView& frame, uint8_t alpha) {
+  const ChromaShape& shape = planes_.shape();
+  uint8_t* const planes[3] = {planes_.plane(slot, 0), planes_.plane(slot, 1),
+                              planes_.plane(slot, 2)};
+  if (!shape.is_shared()) return split_channels(frame, 0, height_, alpha, planes);
+  for (int c = 0; c < kChannels; ++c) {
+    const Spacing at = frame.spacing(c);
+    const int width = c == 0 ? width_ : shape.chroma_width();
+    const int height = c == 0 ? height_ : shape.chroma_height();
+    for (int y = 0; y < height; ++y)
+      spread_samples(frame.channel[c] + y * at.row_stride, at.pixel_stride, 1,
+                     static_cast<size_t>(width), planes[c] + ptrdiff_t{y} * width);
+  }
+  return is_constant_alpha(frame, 0, height_, alpha);
+}
+
 bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
   if (!alpha_) {
     if (bytes_with_alpha() > most_bytes_) return false;
@@ -78,10 +109,10 @@ bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
     alpha_ = std::make_unique_for_overwrite<uint8_t[]>(alpha_bytes());
   }
   uint8_t* to = alpha_of(slot);
-  for (int row = 0; row < height_; ++row) {
-    const uint8_t* from = frame.alpha + row * frame.row_stride;
-    for (int col = 0; col < width_; ++col, from += frame.pixel_stride) *to++ = *from;
-  }
+  const Spacing at = frame.spacing(3);
+  for (int row = 0; row < height_; ++row, to += width_)
+    spread_samples(frame.alpha + row * at.row_stride, at.pixel_stride, 1,
+                   static_cast<size_t>(width_), to);
   return true;
 }
 

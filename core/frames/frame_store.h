@@ -15,6 +15,9 @@ namespace qdmd {
 struct FrameContents {
   int sample_step = 1;  // every k-th pixel in x and y once more, side by side; 1: none
   int cells_along = 0;  // means over the cells of a grid, so many along the short side; 0: none
+  // Pixels that share a sample of channels 1 and 2 in all frames (ChromaShape): such samples are
+  // kept once. 1: whatever frames share, each pixel has its own.
+  int chroma_columns = 1, chroma_rows = 1;
 };
 
 // The newest `capacity` frames of width x height pixels: planes, samples, cells, alpha. Everything
@@ -34,7 +37,8 @@ class FrameStore {
   // With alpha that varies.
   uint64_t bytes_with_alpha() const { return bytes() + (alpha_ ? 0 : alpha_bytes()); }
 
-  // Takes a copy of the frame, in place of the oldest where the store is full. False: its alpha
+  // Takes a copy of the frame, in place of the oldest where the store is full. Where samples are
+  // kept once, the frame's pixels share them. False: its alpha
   // varies, which needs more than `most_bytes`. Throws std::bad_alloc. The newest frame is then
   // undefined.
   bool append(const ImageView& frame);
@@ -67,6 +71,7 @@ class FrameStore {
     return alpha_.get() + static_cast<size_t>(slot) * planes_.pixels();
   }
   bool keep_alpha(int slot, const ImageView& frame);
+  bool take_planes(int slot, const ImageView& frame, uint8_t alpha);
 
   int width_ = 0, height_ = 0, sample_step_ = 1;
   uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
@@ -74,6 +79,8 @@ class FrameStore {
   PlaneSlots samples_;
   Grid grid_;
   GridFrames cells_;
+  // Chroma of the newest frame, a sample for each pixel, where something is made of it.
+  std::vector<uint8_t> spread_;
   // Video with alpha is nearly always opaque: its planes are kept only once one varies.
   std::unique_ptr<uint8_t[]> alpha_;
   std::vector<uint8_t> constant_alpha_, varies_;

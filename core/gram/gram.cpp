@@ -38,10 +38,15 @@ size_t sums_size(int capacity) {
 
 }  // namespace
 
-uint64_t SlidingGram::bytes(int capacity, int threads) {
+uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape) {
   const auto cols = static_cast<uint64_t>(kChannels * capacity);
+  const uint64_t of_thread =
+      sums_size(capacity) * sizeof(int64_t) +
+      (shape.is_shared()
+           ? SharedChromaProducts::bytes(shape, std::min(kRowSnapshots, capacity), capacity)
+           : 0);
   return cols * cols * sizeof(int64_t) + cols * sizeof(uint8_t*) +
-         sums_size(capacity) * sizeof(int64_t) * static_cast<uint64_t>(threads);
+         of_thread * static_cast<uint64_t>(threads);
 }
 
 SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
@@ -56,6 +61,13 @@ SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * has_sums_.size());
 }
 
+SlidingGram::SlidingGram(int capacity, const ChromaShape& shape, Pool* pool, const Kernel& kernel)
+    : SlidingGram(capacity, pool, kernel) {
+  shape_ = shape;
+  for (size_t i = 0; i < threads(); ++i)
+    shared_.emplace_back(shape, kernel, std::min(kRowSnapshots, capacity), capacity);
+}
+
 void SlidingGram::add_newest(const Window& window, int count, int span) {
   const SnapshotRange all(window);
   add_slice(span == 0 ? all : all.newest(span), count, 0, window.plane_size());
@@ -66,13 +78,20 @@ void SlidingGram::make_room() {
   if (threads() <= has_sums_.size()) return;
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * threads());
   has_sums_.assign(threads(), 0);
+  const int capacity = static_cast<int>(by_slot_.rows() / kChannels);
+  while (shape_.is_shared() && shared_.size() < threads())
+    shared_.emplace_back(shape_, kernel_, std::min(kRowSnapshots, capacity), capacity);
+}
+
+void SlidingGram::list_planes(const SnapshotRange& span) {
+  planes_.clear();
+  for (int t = 0; t < span.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
 }
 
 void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
   make_room();
-  planes_.clear();
-  for (int t = 0; t < span.size(); ++t)
-    for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
+  list_planes(span);
   // Each snapshot needs those up to itself only: what comes after is the mirror image.
   for (int start = span.size() - count; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
@@ -81,14 +100,57 @@ void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, 
   }
 }
 
+void SlidingGram::add_rows(const SnapshotRange& span, int frames, int first, int count) {
+  make_room();
+  list_planes(span);
+  for (int start = span.size() - frames; start < span.size(); start += kRowSnapshots) {
+    const int end = std::min(start + kRowSnapshots, span.size());
+    multiply_rows(end - start, end, first, count);
+    store(span, start, end, first == 0);
+  }
+}
+
+int64_t* SlidingGram::sums_of(size_t thread, int row_snapshots, int col_snapshots) {
+  int64_t* sums = sums_.get() + thread * sums_size_;
+  if (!has_sums_[thread])
+    std::fill_n(sums,
+                static_cast<size_t>(kChannels * row_snapshots) *
+                    static_cast<size_t>(kChannels * col_snapshots),
+                int64_t{0});
+  has_sums_[thread] = true;
+  return sums;
+}
+
+// Leaves the sums of the threads that took part.
+void SlidingGram::multiply_rows(int row_snapshots, int col_snapshots, int first, int count) {
+  std::fill(has_sums_.begin(), has_sums_.end(), uint8_t{0});
+  const size_t pixels = static_cast<size_t>(count) * static_cast<size_t>(shape_.rows) *
+                        static_cast<size_t>(shape_.width);
+  const uint64_t pairs = uint64_t{kChannels * kChannels} * static_cast<uint64_t>(row_snapshots) *
+                         static_cast<uint64_t>(col_snapshots);
+  const size_t parts = std::min(part_count(threads(), pairs, pixels),
+                                std::max<size_t>(1, static_cast<size_t>(count)));
+  const auto boundary = [&](size_t part) {
+    return first + static_cast<int>(int64_t{count} * static_cast<int64_t>(part) /
+                                    static_cast<int64_t>(parts));
+  };
+  const auto add = [&](size_t part, size_t thread) {
+    shared_[thread].add(planes_.data(), row_snapshots, col_snapshots, boundary(part),
+                        boundary(part + 1) - boundary(part),
+                        sums_of(thread, row_snapshots, col_snapshots));
+  };
+  if (parts == 1)
+    add(0, 0);
+  else
+    pool_->run(parts, add);
+}
+
 // Leaves the sums of the threads that took part.
 void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, size_t length) {
   const auto row_count = static_cast<size_t>(kChannels * row_snapshots);
   const auto col_count = static_cast<size_t>(kChannels * col_snapshots);
   const auto add = [&](size_t start, size_t end, size_t thread) {
-    int64_t* sums = sums_.get() + thread * sums_size_;
-    if (!has_sums_[thread]) std::fill_n(sums, row_count * col_count, int64_t{0});
-    has_sums_[thread] = true;
+    int64_t* sums = sums_of(thread, row_snapshots, col_snapshots);
     kernel_.add_dot_products(planes_.data() + col_count - row_count, row_count, planes_.data(),
                              col_count, start, end - start, sums);
   };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/gram/kernel.h"
+#include "core/gram/shared_chroma.h"
 #include "core/gram/window.h"
 #include "core/parallel/pool.h"
 #include "core/quaternion/matrix.h"
@@ -25,8 +26,11 @@ class SlidingGram {
   // later need: throws std::bad_alloc.
   explicit SlidingGram(int capacity, Pool* pool = nullptr,
                        const Kernel& kernel = kernels().front());
-  // What SlidingGram(capacity) takes with a pool of so many threads.
-  static uint64_t bytes(int capacity, int threads);
+  // Of frames whose chroma has shared samples: for add_rows().
+  SlidingGram(int capacity, const ChromaShape& shape, Pool* pool = nullptr,
+              const Kernel& kernel = kernels().front());
+  // What SlidingGram(capacity, shape) takes with a pool of so many threads.
+  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {});
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read
@@ -39,6 +43,9 @@ class SlidingGram {
   // any order and size. The group's elements of matrix() are valid once its slices have covered
   // every pixel once. Between slices, other frames may be appended.
   void add_slice(const SnapshotRange& span, int count, size_t first, size_t length);
+  // The same for snapshots of the shape, as far as the pixels of chroma rows first .. first + count
+  // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
+  void add_rows(const SnapshotRange& span, int frames, int first, int count);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;
@@ -46,7 +53,11 @@ class SlidingGram {
  private:
   size_t threads() const { return pool_ ? pool_->threads() : 1; }
   void make_room();
+  void list_planes(const SnapshotRange& span);
+  // Sums of a thread for a call with so many rows and columns, zeros the first time.
+  int64_t* sums_of(size_t thread, int row_snapshots, int col_snapshots);
   void multiply(int row_snapshots, int col_snapshots, size_t first, size_t length);
+  void multiply_rows(int row_snapshots, int col_snapshots, int first, int count);
   void store(const SnapshotRange& span, int start, int end, bool fresh);
 
   // Row 3 s + c has the products of slot s's channel c with the planes of its time and before.
@@ -59,6 +70,8 @@ class SlidingGram {
   std::unique_ptr<int64_t[]> sums_;
   std::vector<uint8_t> has_sums_;  // whether a thread took part
   size_t sums_size_ = 0;           // elements, of one thread
+  ChromaShape shape_;
+  std::vector<SharedChromaProducts> shared_;  // one for each thread
 };
 
 // G_st = x_s^H x_t, m x m, from the identity conj(x) y = x . y - x cross y for pure quaternions.

@@ -17,28 +17,33 @@ void PlaneSlots::Free::operator()(uint8_t* data) const {
   ::operator delete[](data, std::align_val_t(kAlignment));
 }
 
-uint64_t PlaneSlots::bytes(int capacity, size_t pixels) {
-  uint64_t bytes = 0;
-  if (__builtin_mul_overflow(static_cast<uint64_t>(capacity) * kChannels, padded(pixels), &bytes))
+uint64_t PlaneSlots::bytes(int capacity, size_t pixels, size_t chroma_samples) {
+  uint64_t slot = 0, bytes = 0;
+  if (__builtin_mul_overflow(2, padded(chroma_samples), &slot) ||
+      __builtin_add_overflow(slot, padded(pixels), &slot) ||
+      __builtin_mul_overflow(static_cast<uint64_t>(capacity), slot, &bytes))
     return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
 
-PlaneSlots::PlaneSlots(int capacity, size_t pixels)
+PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples)
     : capacity_(capacity),
       pixels_(pixels),
       plane_size_(padded(pixels)),
-      reserved_(bytes(capacity, pixels)),
+      chroma_samples_(chroma_samples),
+      chroma_size_(padded(chroma_samples)),
+      reserved_(bytes(capacity, pixels, chroma_samples)),
       data_(static_cast<uint8_t*>(::operator new[](reserved_, std::align_val_t(kAlignment)))) {}
 
 void PlaneSlots::pad(int slot) {
-  for (int c = 0; c < kChannels; ++c)
-    std::memset(plane(slot, c) + pixels_, 0, plane_size_ - pixels_);
+  std::memset(plane(slot, 0) + pixels_, 0, plane_size_ - pixels_);
+  for (int c = 1; c < kChannels; ++c)
+    std::memset(plane(slot, c) + chroma_samples_, 0, chroma_size_ - chroma_samples_);
 }
 
 void PlaneSlots::resize(size_t pixels) {
-  pixels_ = pixels;
-  plane_size_ = padded(pixels);
+  pixels_ = chroma_samples_ = pixels;
+  plane_size_ = chroma_size_ = padded(pixels);
 }
 
 int Window::append() {

@@ -9,6 +9,22 @@
 
 namespace qdmd {
 
+// Pictures in which no, two neighbouring or 2 x 2 pixels share each sample of channels 1 and 2;
+// fewer do at the right and lower edges of odd sizes.
+struct ChromaShape {
+  int width = 0, height = 0;  // pixels
+  int columns = 1, rows = 1;  // of pixels that share a sample; rows is 1 where columns is
+
+  bool is_shared() const { return columns > 1; }
+  int chroma_width() const { return (width + columns - 1) / columns; }
+  int chroma_height() const { return (height + rows - 1) / rows; }
+  size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
+  // Of channel 1 or 2.
+  size_t samples() const {
+    return static_cast<size_t>(chroma_width()) * static_cast<size_t>(chroma_height());
+  }
+};
+
 // `capacity` slots of three planes of 8-bit samples each. Planes start at multiples of 64 bytes and
 // are padded with zeros, which add nothing to an inner product.
 class PlaneSlots {
@@ -16,19 +32,30 @@ class PlaneSlots {
   PlaneSlots() = default;
   // Throws std::bad_alloc. The pages are touched slot by slot, so a short stream in a long window
   // costs only what it fills.
-  PlaneSlots(int capacity, size_t pixels);
+  PlaneSlots(int capacity, size_t pixels) : PlaneSlots(capacity, pixels, pixels) {}
+  // Channels 1 and 2 have their shared samples only.
+  PlaneSlots(int capacity, const ChromaShape& shape)
+      : PlaneSlots(capacity, shape.pixels(), shape.samples()) {
+    shape_ = shape;
+  }
 
-  // The bytes that PlaneSlots(capacity, pixels) reserves.
-  static uint64_t bytes(int capacity, size_t pixels);
+  // The bytes that PlaneSlots(capacity, pixels) reserves, and that the other does.
+  static uint64_t bytes(int capacity, size_t pixels) { return bytes(capacity, pixels, pixels); }
+  static uint64_t bytes(int capacity, const ChromaShape& shape) {
+    return bytes(capacity, shape.pixels(), shape.samples());
+  }
   uint64_t bytes() const { return reserved_; }
 
   int capacity() const { return capacity_; }
   size_t pixels() const { return pixels_; }
   size_t plane_size() const { return plane_size_; }
+  // Where no samples are shared, it may be nothing.
+  const ChromaShape& shape() const { return shape_; }
 
   const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
   uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
-  // Zeros behind the samples of a slot's planes, whose first pixels() samples the caller fills.
+  // Zeros behind the samples of a slot's planes, whose first ones, as many as a plane has, the
+  // caller fills.
   void pad(int slot);
 
   // From now on planes have `pixels` samples, at most as many as memory was taken for. What they
@@ -39,12 +66,16 @@ class PlaneSlots {
   struct Free {
     void operator()(uint8_t* data) const;
   };
+  PlaneSlots(int capacity, size_t pixels, size_t chroma_samples);
+  static uint64_t bytes(int capacity, size_t pixels, size_t chroma_samples);
   size_t offset(int slot, int channel) const {
-    return (static_cast<size_t>(slot) * kChannels + static_cast<size_t>(channel)) * plane_size_;
+    const size_t before = channel == 0 ? 0 : plane_size_ + (channel == 2 ? chroma_size_ : 0);
+    return static_cast<size_t>(slot) * (plane_size_ + 2 * chroma_size_) + before;
   }
 
   int capacity_ = 0;
-  size_t pixels_ = 0, plane_size_ = 0;
+  size_t pixels_ = 0, plane_size_ = 0, chroma_samples_ = 0, chroma_size_ = 0;
+  ChromaShape shape_;
   uint64_t reserved_ = 0;
   std::unique_ptr<uint8_t[], Free> data_;
 };
@@ -85,6 +116,8 @@ class SnapshotRange {
   size_t pixels() const { return planes_->pixels(); }
   size_t plane_size() const { return planes_->plane_size(); }
   int slot(int index) const { return (first_slot_ + index * stride_) % planes_->capacity(); }
+  const ChromaShape& shape() const { return planes_->shape(); }
+  // As it is kept: of channels 1 and 2 the shared samples, if there are any.
   const uint8_t* plane(int index, int channel) const {
     return planes_->plane(slot(index), channel);
   }

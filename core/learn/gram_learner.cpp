@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/dmd/qdmd.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -16,6 +17,9 @@ constexpr int kChosenStep = 1;
 constexpr size_t kPixelsPerPart = 16384;
 
 constexpr size_t kUnit = BackgroundModel::kSliceUnit;
+
+// Pixels of all snapshots that are spread at once: they stay in the second-level cache.
+constexpr size_t kRun = 1024;
 
 }  // namespace
 
@@ -78,8 +82,13 @@ void GramLearner::begin(const LearnerRoom& room) {
   room_ = room;
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
-  gram_ = SlidingGram(room.frames->capacity(), room.pool);
+  const int capacity = room.frames->capacity();
+  gram_ = shares_chroma() ? SlidingGram(capacity, room.frames->window().shape(), room.pool)
+                          : SlidingGram(capacity, room.pool);
 }
+
+// What the decomposition sees has samples that pixels share.
+bool GramLearner::shares_chroma() const { return room_.frames->samples().shape().is_shared(); }
 
 SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
   return snapshots.in(room_.frames->samples());
@@ -88,6 +97,14 @@ SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
 void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
   const Clock::Span span_of_time(*room_.clock, Clock::products);
   const SnapshotRange columns = columns_of(span);
+  if (shares_chroma()) {
+    const auto rows = static_cast<size_t>(columns.shape().chroma_height());
+    const size_t first = slice.first(rows, 1), count = slice.size(rows, 1);
+    // The first slice begins a group, however thin it is.
+    if (slice.index == 0 || count > 0)
+      gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
+    return;
+  }
   gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
                   slice.size(columns.plane_size(), kUnit));
 }
@@ -118,14 +135,47 @@ void GramLearner::build(Slice slice, BackgroundModel* model) {
   const Clock::Span span_of_time(*room_.clock, Clock::pictures);
   if (slice.index == 0) {
     built_ = decomposed_;
-    model->begin(*snapshots_, background_, room_.models == Models::two_of_live);
+    // What is combined directly is read from planes in which each pixel has its samples.
+    const bool keep = snapshots_->shape().is_shared() || room_.models == Models::two_of_live;
+    model->begin(*snapshots_, background_, keep);
   }
   const size_t first = slice.first(snapshots_->pixels(), kUnit),
                length = slice.size(snapshots_->pixels(), kUnit);
   const auto parts = static_cast<int>(std::max<size_t>(1, length / kPixelsPerPart));
+  if (snapshots_->shape().is_shared()) {
+    build_spread(first, length, parts, model);
+    return;
+  }
   room_.pool->run(static_cast<size_t>(parts), [&](size_t part) {
     const Slice band = {static_cast<int>(part), parts};
     model->build_slice(first + band.first(length, kUnit), band.size(length, kUnit));
+  });
+}
+
+// From chroma that is spread to pixels, run by run.
+void GramLearner::build_spread(size_t first, size_t length, int parts, BackgroundModel* model) {
+  const auto snapshots = static_cast<size_t>(snapshots_->size());
+  const size_t planes_of_chroma = (kChannels - 1) * snapshots;
+  // Taken here: tasks of the pool take no memory.
+  const auto room =
+      std::make_unique_for_overwrite<uint8_t[]>(planes_of_chroma * kRun * room_.pool->threads());
+  const auto planes = std::make_unique_for_overwrite<const uint8_t*[]>(kChannels * snapshots *
+                                                                       room_.pool->threads());
+  room_.pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
+    const Slice band = {static_cast<int>(part), parts};
+    const size_t end = first + band.first(length, kUnit) + band.size(length, kUnit);
+    const uint8_t** const of_run = planes.get() + worker * kChannels * snapshots;
+    for (size_t p = first + band.first(length, kUnit); p < end; p += kRun) {
+      const size_t count = std::min(kRun, end - p);
+      uint8_t* to = room.get() + worker * planes_of_chroma * kRun;
+      for (size_t t = 0; t < snapshots; ++t)
+        for (int c = 0; c < kChannels; ++c) {
+          of_run[kChannels * t + static_cast<size_t>(c)] =
+              read_samples(*snapshots_, static_cast<int>(t), c, p, count, to);
+          if (c > 0) to += kRun;
+        }
+      model->build_from(of_run, p, count);
+    }
   });
 }
 

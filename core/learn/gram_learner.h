@@ -30,6 +30,8 @@ class GramLearner : public Learner {
   SolveFacts facts() const override { return built_; }
 
  private:
+  bool shares_chroma() const;
+  void build_spread(size_t first, size_t length, int parts, BackgroundModel* model);
   // What the decomposition sees of them.
   SnapshotRange columns_of(const SnapshotRange& snapshots) const;
 

@@ -34,6 +34,10 @@ enum class Models {
   two_of_live  // and the one in use outlives its window's frames: all its modes are pictures
 };
 
+// What a camera shows: the scene of the background, another one, or the one that it showed before
+// that.
+enum class SceneSeen { same, another, the_one_before };
+
 // Where a learner works.
 struct LearnerRoom {
   const FrameStore* frames;  // made for the learner's contents()
@@ -100,13 +104,33 @@ class Learner {
   // That model is now the one in use.
   virtual void publish() {}
 
-  // ---- What was uncovered ----
+  // ---- What was uncovered, and what stays ----
 
-  // Live, after each frame that is compared with the background in use, `model` at time t:
-  // `newest` are the newest frames, that one last. Where they show that something has left that
-  // `model` took for background, it has what was behind from now on.
-  static constexpr int kMendingFrames = 9;  // as many as there are, but no more than these
-  virtual void mend(const SnapshotRange& /*newest*/, double /*t*/, BackgroundModel* /*model*/) {}
+  // Before each frame is compared with the background in use, `model`. Where frames show that
+  // something has left that the model took for background (live), or that something which came
+  // stood still for the time to absorb, the model has what they show from now on.
+  static constexpr int kMendingFrames = 9;
+  struct Compared {
+    SnapshotRange around;  // the frame, and others that come next to it, kMendingFrames at most
+    int at = 0;            // which of them it is
+    int64_t number = 0;    // of that frame, counted like FrameStore::frames_taken()
+    double t = 0;          // the frame's time in the model
+    bool live = false;
+  };
+  virtual void mend(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
+  // Takes effect with the next frame. 0: never.
+  virtual void set_absorb_frames(int64_t) {}
+
+  // ---- Another scene ----
+
+  // What the newest kSceneFrames show, which came after one another, the last in `slot`: the scene
+  // of the background in use, or another one. What is not the same is said once, until there is a
+  // background of that scene.
+  virtual SceneSeen scene_of(int /*slot*/) { return SceneSeen::same; }
+  static constexpr int kSceneFrames = 8;
+  // Solves to come know nothing of what was before; the background in use stays. Not while one
+  // runs.
+  virtual void begin_scene() {}
 
   // ---- Light ----
 

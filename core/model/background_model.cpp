@@ -93,17 +93,24 @@ void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel&
   build_slice(0, pixels_);
 }
 
+Gain BackgroundModel::light(double t) const {
+  if (gains_.empty()) return kSameLight;
+  const auto last = static_cast<double>(gains_.size() - 1);
+  return gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
+}
+
 void BackgroundModel::set_time(double t) {
   if (frozen_) {
     weights_.assign(kIdentity.begin(), kIdentity.end());
-    if (!gains_.empty())
-      for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gains_.front()[c];
+    if (!gains_.empty()) {
+      const Gain gain = light(t);
+      for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gain[c];
+    }
     return;
   }
   model_.weights(t / stride_, &time_weights_);
   if (!gains_.empty()) {
-    const auto last = static_cast<double>(gains_.size() - 1);
-    const Gain& gain = gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
+    const Gain gain = light(t);
     for (size_t c = 0; c < gain.size(); ++c)
       time_weights_.row(static_cast<Eigen::Index>(c)) *= gain[c];
   }
@@ -161,6 +168,13 @@ void BackgroundModel::freeze_at(double t) {
   frozen_ = true;
   gains_.clear();
   weights_.assign(kIdentity.begin(), kIdentity.end());
+}
+
+void BackgroundModel::freeze_but_for_light(double t) {
+  std::vector<Gain> gains;
+  gains.swap(gains_);
+  freeze_at(t);
+  gains_.swap(gains);
 }
 
 void BackgroundModel::replace(size_t first, size_t count, const uint8_t* const level[3]) {

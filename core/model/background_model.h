@@ -37,8 +37,8 @@ class BackgroundModel {
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
   // For set_time() from now on, in place of the snapshots' gains.
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
-  // That one.
-  Gain light() const { return gains_.empty() ? kSameLight : gains_.front(); }
+  // That of time t.
+  Gain light(double t) const;
 
   // Of each pixel, in levels: what its residual must exceed to be foreground where nobody asks for
   // a threshold. Room for them, kept until begin().
@@ -66,6 +66,8 @@ class BackgroundModel {
   // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are
   // no longer needed.
   void freeze_at(double t);
+  // The same, but the light is at each time what it was.
+  void freeze_but_for_light(double t);
   // The same with a picture that no window made: planes of `pixels` samples, and limits or null.
   // Throws only where make_room() was not called before.
   void freeze_as(const std::vector<uint8_t> level[kChannels], const std::vector<uint8_t>* limits,

@@ -6,6 +6,8 @@
 #include <functional>
 #include <utility>
 
+#include "core/passes/chroma.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/planes.cpp"
 #include "core/passes/simd.h"
@@ -101,6 +103,7 @@ struct Packing {
   // False where the view is not of packed pixels in which alpha is the first or last byte.
   template <typename Byte>
   bool describe(const BasicImageView<Byte>& view) {
+    if (!view.is_even()) return false;
     const ptrdiff_t stride = view.pixel_stride;
     if (stride != 3 && stride != 4) return false;
     if ((stride == 4) != (view.alpha != nullptr)) return false;
@@ -118,10 +121,43 @@ struct Packing {
   }
 };
 
+// Of a frame whose channels have distances of their own.
+bool split_uneven(const ImageView& frame, int first_row, int row_count, uint8_t alpha,
+                  uint8_t* const planes[3]) {
+  const auto width = static_cast<size_t>(frame.width);
+  for (int c = 0; c < 3; ++c) {
+    const Spacing at = frame.spacing(c);
+    for (int y = first_row; y < first_row + row_count; ++y) {
+      uint8_t* const to = planes[c] + static_cast<size_t>(y) * width;
+      if (y > first_row && y % at.rows != 0)
+        std::memcpy(to, to - width, width);
+      else
+        spread_samples(frame.channel[c] + y / at.rows * at.row_stride, at.pixel_stride, at.columns,
+                       width, to);
+    }
+  }
+  return is_constant_alpha(frame, first_row, row_count, alpha);
+}
+
 }  // namespace
+
+bool is_constant_alpha(const ImageView& frame, int first_row, int row_count, uint8_t alpha) {
+  if (!frame.alpha || frame.alpha_is_padding) return true;
+  const Spacing at = frame.spacing(3);
+  bool constant = true;
+  for (int y = first_row; y < first_row + row_count && constant; ++y) {
+    const uint8_t* row = frame.alpha + y * at.row_stride;
+    if (at.pixel_stride == 1)
+      constant = are_all(row, alpha, static_cast<size_t>(frame.width));
+    else
+      for (int x = 0; x < frame.width; ++x) constant &= row[x * at.pixel_stride] == alpha;
+  }
+  return constant;
+}
 
 bool split_channels(const ImageView& frame, int first_row, int row_count, uint8_t alpha,
                     uint8_t* const planes[3]) {
+  if (!frame.is_even()) return split_uneven(frame, first_row, row_count, alpha, planes);
   const ptrdiff_t stride = frame.pixel_stride;
   const bool has_alpha = frame.alpha && !frame.alpha_is_padding;
   size_t rows = static_cast<size_t>(row_count), width = static_cast<size_t>(frame.width);

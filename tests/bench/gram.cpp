@@ -145,6 +145,33 @@ void window_gram(benchmark::State& state, const Kernel& kernel, const Case& c) {
   if (peak) state.counters["of_peak"] = median(fractions);
 }
 
+// The same window with a quarter of the chroma samples, 2 x 2 pixels to each.
+void window_of_shared_chroma(benchmark::State& state, const Kernel& kernel, const Case& c) {
+  const ChromaShape shape = {c.width, c.height, 2, 2};
+  Window window(c.frames, shape);
+  std::mt19937 rng(7);
+  for (int t = 0; t < c.frames; ++t) {
+    const int slot = window.append();
+    for (int channel = 0; channel < kChannels; ++channel)
+      for (size_t p = 0; p < (channel == 0 ? shape.pixels() : shape.samples()); ++p)
+        window.plane(slot, channel)[p] = static_cast<uint8_t>(rng() >> 9);
+  }
+  Pool pool(c.threads);
+  SlidingGram gram(c.frames, shape, &pool, kernel);
+  const clockid_t clock = c.threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
+  const int slice = (shape.chroma_height() + c.slices - 1) / c.slices;
+  for (auto _ : state) {
+    const double start = seconds(clock);
+    for (int first = 0; first < c.frames; first += kGroup) {
+      const int end = std::min(first + kGroup, c.frames);
+      for (int row = 0; row < shape.chroma_height(); row += slice)
+        gram.add_rows({window, 0, end}, end - first, row,
+                      std::min(slice, shape.chroma_height() - row));
+    }
+    state.SetIterationTime(seconds(clock) - start);
+  }
+}
+
 void register_window(const Kernel& kernel, const Case& c) {
   std::string name = std::string(kernel.name) + "/m:" + std::to_string(c.frames) + "/" +
                      std::to_string(c.width) + "x" + std::to_string(c.height) +
@@ -152,6 +179,11 @@ void register_window(const Kernel& kernel, const Case& c) {
   if (c.slices > 1) name += "/slices:" + std::to_string(c.slices);
   benchmark::RegisterBenchmark(
       name.c_str(), [kernel, c](benchmark::State& state) { window_gram(state, kernel, c); })
+      ->Unit(benchmark::kMillisecond)
+      ->UseManualTime();
+  benchmark::RegisterBenchmark(
+      ("shared-chroma/" + name).c_str(),
+      [kernel, c](benchmark::State& state) { window_of_shared_chroma(state, kernel, c); })
       ->Unit(benchmark::kMillisecond)
       ->UseManualTime();
 }

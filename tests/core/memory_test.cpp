@@ -71,6 +71,15 @@ void paint(int t, Alpha alpha, Picture* picture) {
     }
 }
 
+// Another scene: bars, where there are columns else.
+void turn(Picture* picture) {
+  for (size_t p = 0; p < picture->pixels(); ++p) {
+    const size_t y = p / static_cast<size_t>(picture->width);
+    for (size_t c = 0; c < 3; ++c)
+      picture->at(c, p) = static_cast<uint8_t>(40 + 160 * (y / 8 % 2) + picture->at(c, p) / 16);
+  }
+}
+
 // From configure() to the end: two windows, a bit of a third, its end, most of another one, and
 // what else can be asked. Returns the bytes that the engine says it takes.
 double run(const Case& c) {
@@ -92,9 +101,10 @@ double run(const Case& c) {
     while (engine.ready()) see([&] { engine.pop(Output::mask, picture.out()); });
     see([&] { engine.write_background(picture.out()); });
   };
-  const auto stream = [&](int frames) {
-    for (int t = 0; t < frames; ++t) {
+  const auto stream = [&](int frames, int others) {
+    for (int t = 0; t < (others > 0 ? c.window + others : 0) + frames; ++t) {
       paint(t, c.alpha, &picture);
+      if (t >= c.window && t < c.window + others) turn(&picture);
       see([&] { status = engine.push(picture.in()); });
       EXPECT_TRUE(status.ok()) << status.message;
       pop();
@@ -103,9 +113,12 @@ double run(const Case& c) {
     EXPECT_TRUE(status.ok()) << status.message;
     pop();
   };
-  stream(2 * c.window + c.window / 5 + 2);
+  // Live keeps what it knew of a scene while the camera shows another one.
+  const bool knows_scenes = c.method == Method::robust && c.mode == Mode::live;
+  const int others = knows_scenes ? std::max(12, c.window / 2) : 0;
+  stream(2 * c.window + c.window / 5 + 2, others);
   // A window that is not full looks at most of its frames, beside those that are remembered.
-  stream(c.window - 1);
+  stream(c.window - 1, 0);
   const auto promised = static_cast<double>(engine.bytes());
   see([&] { engine.close(); });
   return promised;

@@ -117,7 +117,7 @@ TEST(StandingLooks, WhatLeftIsNoticedAndWhatCameIsNot) {
           frame.picture.plane(0, c)[cell] *= light[static_cast<size_t>(c)];
       StandingLooks looks(frame.grid);
       for (int t = 1; t < 30; ++t) {
-        looks.follow(frame.planes().data(), light);
+        looks.follow(frame.planes().data(), light, t);
         const auto found = looks.uncovered(background.planes().data());
         EXPECT_EQ(found.size(), leaves && t >= StandingLooks::kSteady ? 35u : 0u) << t;
         for (int cell : found) {
@@ -134,16 +134,40 @@ TEST(StandingLooks, WhoPassesIsNoLook) {
   background.box(180);
   passing.box(40);
   StandingLooks looks(empty.grid);
-  for (int t = 0; t < 12; ++t) looks.follow(empty.planes().data(), kSameLight);
+  for (int t = 0; t < 12; ++t) looks.follow(empty.planes().data(), kSameLight, t);
   ASSERT_FALSE(looks.uncovered(background.planes().data()).empty());
   // Fewer frames than a look needs.
   for (int t = 1; t < StandingLooks::kSteady; ++t)
-    looks.follow(passing.planes().data(), kSameLight);
+    looks.follow(passing.planes().data(), kSameLight, t);
   EXPECT_TRUE(looks.uncovered(background.planes().data()).empty()) << "somebody is before it";
-  looks.follow(empty.planes().data(), kSameLight);
+  looks.follow(empty.planes().data(), kSameLight, 30);
   const auto again = looks.uncovered(background.planes().data());
   EXPECT_EQ(again.size(), 35u);
   for (int cell : again) EXPECT_NEAR(looks.level(cell, 0), 100, 0.1);
+}
+
+TEST(StandingLooks, WhatStandsIsKnownAfterItsTimeWhoeverPasses) {
+  Floor empty, bag, passing;
+  bag.box(180);
+  passing.box(40);
+  StandingLooks looks(empty.grid);
+  const auto planes = empty.planes();
+  for (int t = 0; t < 200; ++t) {
+    // From frame 40 on; somebody stands before it for a while.
+    const Floor &frame = t < 40 ? empty : t >= 70 && t < 90 ? passing : bag;
+    looks.follow(frame.planes().data(), kSameLight, t);
+    const auto &stood = looks.stood(planes.data(), 100);
+    ASSERT_EQ(!stood.empty(), t >= 140) << t;
+    if (stood.empty()) continue;
+    // With the cells next to it.
+    EXPECT_EQ(stood.size(), 9u * 7u);
+    EXPECT_EQ(looks.since(30 * 6 + 9), 40);
+  }
+  // What has gone is no longer there, and what comes again has to wait anew.
+  for (int t = 200; t < 600; ++t) {
+    looks.follow((t < 500 ? empty : bag).planes().data(), kSameLight, t);
+    ASSERT_TRUE(looks.stood(planes.data(), 100).empty()) << t;
+  }
 }
 
 TEST(StandingLooks, OfTinyPicturesSayNothing) {
@@ -153,7 +177,7 @@ TEST(StandingLooks, OfTinyPicturesSayNothing) {
   const float *const a[3] = {one.plane(0, 0), one.plane(0, 1), one.plane(0, 2)},
                      *const b[3] = {other.plane(0, 0), other.plane(0, 1), other.plane(0, 2)};
   StandingLooks looks(grid);
-  for (int t = 0; t < 20; ++t) looks.follow(a, kSameLight);
+  for (int t = 0; t < 20; ++t) looks.follow(a, kSameLight, t);
   EXPECT_TRUE(looks.uncovered(b).empty());
 }
 

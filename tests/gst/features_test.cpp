@@ -87,6 +87,34 @@ TEST(Messages, TimesFollowTheSegment) {
   gst_message_unref(messages[0]);
 }
 
+TEST(Messages, OfAnotherScene) {
+  for (const char* mode : {"batch", "live"}) {
+    Stream stream(std::string("qdmdbackground window-size=20 mode=") + mode, GST_VIDEO_FORMAT_RGB,
+                  96, 64);
+    Element element(stream);
+    const auto street = [](int t, int x, int y, uint8_t rgb[3]) {
+      // Bars, and columns from frame 50 on.
+      const int bar = (t < 50 ? x : y) / 8 % 2;
+      for (int c = 0; c < 3; ++c) rgb[c] = static_cast<uint8_t>(60 + 90 * bar + 10 * c);
+    };
+    stream.push_many(0, 50, street);
+    EXPECT_TRUE(element.messages().empty());
+    stream.push_many(50, 30, street);
+    const auto messages = element.messages();
+    ASSERT_EQ(1u, messages.size()) << mode;
+    const GstStructure* s = gst_message_get_structure(messages[0]);
+    ASSERT_TRUE(gst_structure_has_name(s, "qdmdbackground-scene"));
+    guint64 timestamp = 0, stream_time = 0, running_time = 0;
+    ASSERT_TRUE(gst_structure_get(s, "timestamp", G_TYPE_UINT64, &timestamp, "stream-time",
+                                  G_TYPE_UINT64, &stream_time, "running-time", G_TYPE_UINT64,
+                                  &running_time, nullptr));
+    EXPECT_EQ(57 * kFrame, timestamp);
+    EXPECT_EQ(timestamp, stream_time);
+    EXPECT_EQ(timestamp, running_time);
+    gst_message_unref(messages[0]);
+  }
+}
+
 // ---- The background as a sample ----
 
 TEST(BackgroundSample, IsTheNewestPicture) {
@@ -409,7 +437,8 @@ TEST(PropertyStorm, LosesNoFrame) {
         element.set("output", static_cast<gint>(i % 4), "foreground-threshold", (i % 50) * 1.0,
                     "freeze", i % 11 == 0 ? TRUE : FALSE, "n-threads", i % 4, "post-messages",
                     i % 2 ? TRUE : FALSE, "regions", i % 3 ? TRUE : FALSE, "regions-min-area",
-                    i % 20, "time-budget", i % 5 == 0 ? 0.01 * i : 0.0);
+                    i % 20, "time-budget", i % 5 == 0 ? 0.01 * i : 0.0, "absorb-time",
+                    0.04 * (i % 7));
         for (GstMessage* message : element.messages()) gst_message_unref(message);
         g_usleep(200);
       }

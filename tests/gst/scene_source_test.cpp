@@ -21,18 +21,53 @@ struct Frame {
   GstVideoInfo info;
   std::vector<uint8_t> rgb;     // width x height x 3
   std::vector<uint8_t> fourth;  // width x height where the format has four bytes a pixel
+  // Of formats of Y, U and V, and of grey: each component's samples, and all bytes.
+  std::vector<std::vector<int>> components;
+  std::vector<uint8_t> bytes;
 };
 using Frames = std::vector<Frame>;
 
+void unpack_components(GstBuffer* buffer, GstVideoFrame* frame, Frame* result) {
+  for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(frame); ++c) {
+    std::vector<int> samples;
+    // V is two bytes behind U, and not one, as GStreamer 1.22 has it.
+    const bool wrong = GST_VIDEO_FRAME_FORMAT(frame) == GST_VIDEO_FORMAT_P010_10LE &&
+                       GST_VIDEO_FRAME_COMP_POFFSET(frame, c) == 1;
+    for (int y = 0; y < GST_VIDEO_FRAME_COMP_HEIGHT(frame, c); ++y)
+      for (int x = 0; x < GST_VIDEO_FRAME_COMP_WIDTH(frame, c); ++x) {
+        const auto* from = static_cast<const uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(frame, c)) +
+                           y * GST_VIDEO_FRAME_COMP_STRIDE(frame, c) +
+                           x * GST_VIDEO_FRAME_COMP_PSTRIDE(frame, c) + wrong;
+        const bool deep = GST_VIDEO_FRAME_COMP_DEPTH(frame, c) > 8;
+        samples.push_back((deep ? GST_READ_UINT16_LE(from) : *from) >>
+                          GST_VIDEO_FORMAT_INFO_SHIFT(frame->info.finfo, c));
+      }
+    result->components.push_back(std::move(samples));
+  }
+  result->bytes.resize(gst_buffer_get_size(buffer));
+  gst_buffer_extract(buffer, 0, result->bytes.data(), result->bytes.size());
+}
+
 Frame unpack(GstBuffer* buffer, GstPad* pad) {
-  Frame result{
-      GST_BUFFER_PTS(buffer), GST_BUFFER_DURATION(buffer), GST_BUFFER_OFFSET(buffer), {}, {}, {}};
+  Frame result{GST_BUFFER_PTS(buffer),
+               GST_BUFFER_DURATION(buffer),
+               GST_BUFFER_OFFSET(buffer),
+               {},
+               {},
+               {},
+               {},
+               {}};
   GstCaps* caps = gst_pad_get_current_caps(pad);
   EXPECT_TRUE(gst_video_info_from_caps(&result.info, caps));
   gst_caps_unref(caps);
   GstVideoFrame frame;
   if (!gst_video_frame_map(&frame, &result.info, buffer, GST_MAP_READ)) {
     ADD_FAILURE() << "could not map";
+    return result;
+  }
+  if (!GST_VIDEO_INFO_IS_RGB(&result.info)) {
+    unpack_components(buffer, &frame, &result);
+    gst_video_frame_unmap(&frame);
     return result;
   }
   const int step = GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, 0);
@@ -179,6 +214,64 @@ TEST(SceneSource, LabelsAreTheMaskWithShadowsAndEdgesApart) {
   }
   ASSERT_EQ(pixels.size(), 4u);
   for (const int label : {0, 50, 170, 255}) EXPECT_GT(pixels[static_cast<uint8_t>(label)], 3000u);
+}
+
+// The same colours as Y, U and V: of the pixels that share a sample, the mean.
+void expect_colours(const Frame& rgb, const Frame& frame) {
+  const GstVideoInfo& info = frame.info;
+  double kr = 0, kb = 0;
+  ASSERT_TRUE(gst_video_color_matrix_get_Kr_Kb(info.colorimetry.matrix, &kr, &kb));
+  gint offset[GST_VIDEO_MAX_COMPONENTS], scale[GST_VIDEO_MAX_COMPONENTS];
+  gst_video_color_range_offsets(info.colorimetry.range, info.finfo, offset, scale);
+  for (size_t c = 0; c < frame.components.size(); ++c) {
+    const int columns = 1 << GST_VIDEO_FORMAT_INFO_W_SUB(info.finfo, c);
+    const int rows = 1 << GST_VIDEO_FORMAT_INFO_H_SUB(info.finfo, c);
+    size_t i = 0;
+    for (int top = 0; top < info.height; top += rows)
+      for (int left = 0; left < info.width; left += columns) {
+        double mean[3] = {}, count = 0;
+        for (int y = top; y < std::min(top + rows, info.height); ++y)
+          for (int x = left; x < std::min(left + columns, info.width); ++x, ++count)
+            for (int k = 0; k < 3; ++k)
+              mean[k] += rgb.rgb[static_cast<size_t>(3 * (y * info.width + x) + k)];
+        for (double& sum : mean) sum /= 255 * count;
+        const double luma = kr * mean[0] + (1 - kr - kb) * mean[1] + kb * mean[2];
+        const double part = c == 0   ? luma
+                            : c == 1 ? (mean[2] - luma) / (2 * (1 - kb))
+                                     : (mean[0] - luma) / (2 * (1 - kr));
+        // Rounded, but for weights that are rounded, too.
+        ASSERT_NEAR(frame.components[c][i++], offset[c] + scale[c] * part, 0.52)
+            << "component " << c << " at " << left << " " << top;
+      }
+  }
+}
+
+TEST(SceneSource, VideoFormatsHaveTheSameColours) {
+  for (const char* size : {"width=33,height=17", "width=64,height=48", "width=1,height=1"}) {
+    const Frames expected =
+        frames_of("num-buffers=4 scene=noise", std::string("format=RGB,") + size);
+    const Frames mask = frames_of("num-buffers=4 truth=mask", std::string("format=RGB,") + size);
+    for (const char* format :
+         {"I420", "NV12", "Y42B", "YUY2", "Y444", "I420_10LE", "P010_10LE", "GRAY8"})
+      for (const char* colours : {"bt601", "bt709", "1:4:0:0"}) {
+        // Grey has no matrix to choose.
+        const bool grey = std::string(format) == "GRAY8";
+        if (grey && std::string(colours) == "bt709") continue;
+        SCOPED_TRACE(std::string(format) + " " + colours + " " + size);
+        const std::string caps =
+            std::string(size) + ",format=" + format + ",colorimetry=" + colours;
+        const Frames frames = frames_of("num-buffers=4 scene=noise", caps);
+        const Frames masks = frames_of("num-buffers=4 truth=mask", caps);
+        const Frames again = frames_of("num-buffers=4 scene=noise", caps);
+        ASSERT_EQ(frames.size(), expected.size());
+        for (size_t t = 0; t < frames.size(); ++t) {
+          expect_colours(expected[t], frames[t]);
+          expect_colours(mask[t], masks[t]);
+          EXPECT_EQ(frames[t].bytes, again[t].bytes);
+          if (testing::Test::HasFailure()) return;
+        }
+      }
+  }
 }
 
 TEST(SceneSource, EveryFormatHasTheSameColours) {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Puts the tables and pictures of docs/masks.md anew. Needs the sequences: QDMD_DATA names the folder
 # that has SBI, SBMnet and CDnet; QDMD_MORE one that has `fall` and `pedestrians` of CDnet. Takes about
-# eight minutes.
+# ten minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 need_sequences
@@ -9,10 +9,15 @@ more=${QDMD_MORE:-../shared/measure/sequences}
 [ -d "$more/fall" ] || { echo "Set QDMD_MORE to a folder that has CDnet's fall and pedestrians." >&2; exit 1; }
 
 tests/install-dependencies.sh build test demo docs
-build gst/libgstqdmd.so gst/libgstqdmdscene.so tests/evaluation/qdmd-mask-steps tests/bench/masks
+build gst/libgstqdmd.so gst/libgstqdmdscene.so tests/evaluation/qdmd-mask-steps tests/evaluation/qdmd-mask-constants \
+  tests/bench/masks
 
 echo "== steps" >&2
 build/tests/evaluation/qdmd-mask-steps --dataset "$QDMD_DATA" --dataset "$more" >"$results/steps.md"
+
+echo "== constants" >&2
+build/tests/evaluation/qdmd-mask-constants --dataset "$QDMD_DATA" --dataset "$more" --factors 0.7,1.4 \
+  >"$results/constants.md"
 
 echo "== scenes" >&2
 scenes="basic intermittent-motion illumination-changes background-motion storm basic,jitter=2 basic,jitter=5

@@ -72,7 +72,9 @@ def soft(folder, path):
 def main(page, results):
     with open(os.path.join(results, 'steps.md')) as file:
         steps = file.read()
-    put(page, {'steps': steps, 'scenes': scenes(os.path.join(results, 'scenes.md')),
+    with open(os.path.join(results, 'constants.md')) as file:
+        constants = file.read()
+    put(page, {'steps': steps, 'constants': constants, 'scenes': scenes(os.path.join(results, 'scenes.md')),
                'cost': cost(os.path.join(results, 'cost.json'))})
     sheets = [matplotlib.image.imread(os.path.join(results, f'sheet-{name}.png'))
               for name in ('basic-shadow', 'background-motion', 'basic-night')]

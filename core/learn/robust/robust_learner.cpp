@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/dmd/qdmd.h"
 #include "core/learn/robust/median_picture.h"
@@ -86,7 +87,11 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       StableFrames::bytes(grid_, looks) + WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
-      StandingLooks::bytes(grid_) + static_cast<uint64_t>(window_size) * sizeof(Gain);
+      StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
+      static_cast<uint64_t>(window_size) * sizeof(Gain);
+  // A scene that was left: levels and limits, and the same once more for windows to come. Where it
+  // is back, there are two for a moment.
+  const uint64_t scene = models == Models::two_of_live ? pixels() * (2 * kChannels + 2) : 0;
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
@@ -98,8 +103,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size);
-  return kept + made +
-         std::max({start, masks,
+  return kept + made + scene +
+         std::max({start, masks, scene,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
                                        window_size),
                    filling});
@@ -128,6 +133,8 @@ void RobustLearner::begin(const LearnerRoom& room) {
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = Earlier(grid_);
   looks_ = StandingLooks(grid_);
+  absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
+  scene_ = SceneWatch(grid_);
   memory_ = FrameMemory(remembered_frames(room.window_size), pixels(), grid_);
   mask_ = WindowMask(snapshots, pixels());
   samples_ = Window(snapshots, samples_at(finest_step_));
@@ -143,7 +150,38 @@ void RobustLearner::forget() {
   earlier_.forget();
   memory_.forget();
   looks_.forget();
+  absorbed_.forget();
+  scene_.forget();
+  other_scene_ = scene_begins_ = false;
   stream_from_ = -1;
+}
+
+void RobustLearner::publish() {
+  published_ = 1 - published_;
+  if (!std::exchange(scene_begins_, false)) return;
+  looks_.forget();
+  other_scene_ = false;
+}
+
+SceneSeen RobustLearner::scene_of(int slot) {
+  if (other_scene_) return SceneSeen::same;
+  const GridFrames& cells = room_.frames->cells();
+  const float* const frame[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
+  const float* const background[3] = {background_cells_.plane(published_, 0),
+                                      background_cells_.plane(published_, 1),
+                                      background_cells_.plane(published_, 2)};
+  const SceneSeen seen = scene_.follow(frame, background);
+  other_scene_ = seen != SceneSeen::same;
+  if (other_scene_) scene_.leave();
+  return seen;
+}
+
+void RobustLearner::begin_scene() {
+  earlier_.forget();
+  memory_.forget();
+  absorbed_.forget();
+  stream_from_ = -1;
+  scene_begins_ = true;
 }
 
 void RobustLearner::remember(Learnt* learnt) const {
@@ -164,27 +202,40 @@ void RobustLearner::follow(const std::vector<uint8_t> level[kChannels]) {
     cell_means(grid_, level[c].data(), background_cells_.plane(published_, c));
 }
 
-void RobustLearner::mend(const SnapshotRange& newest, double t, BackgroundModel* model) {
-  const int slot = newest.slot(newest.size() - 1);
+void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
+  // Somebody may want more of a frame than one picture.
+  if (frame.number <= compared_) return;
+  compared_ = frame.number;
+  const int slot = frame.around.slot(frame.at);
   const GridFrames& cells = room_.frames->cells();
-  const float* const frame[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
-  const Gain light = model->light();
-  looks_.follow(frame, light);
+  const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
+  const Gain light = model->light(frame.t);
+  looks_.follow(now, light, frame.number);
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  const std::vector<int>& uncovered = looks_.uncovered(background);
-  if (uncovered.empty()) return;
-  model->set_light(kSameLight);
-  model->freeze_at(t);
-  replace(uncovered, newest, light, model);
-  model->set_light(light);
+  // A window that is solved as a whole knows by itself what was uncovered, unless it was absorbed.
+  if (frame.live || absorbed_.any()) {
+    std::vector<int> uncovered = looks_.uncovered(background);
+    if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
+    mend(uncovered, frame, light, model);
+  }
+  if (absorb_frames_ == 0) return;
+  const std::vector<int>& stood = looks_.stood(background, absorb_frames_);
+  for (int cell : stood) absorbed_.add(cell, looks_.since(cell));
+  mend(stood, frame, light, model);
 }
 
-// The median of the newest frames, every second one, in place of the background of these cells.
-void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& newest,
+void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
+                         BackgroundModel* model) {
+  if (cells.empty()) return;
+  model->freeze_but_for_light(frame.t);
+  replace(cells, frame.around.every(2), light, model);
+}
+
+// The median of the frames in place of the background of these cells.
+void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& frames,
                             const Gain& light, BackgroundModel* model) {
-  const SnapshotRange frames = newest.every(2);
   const auto count = static_cast<size_t>(frames.size());
   const uint8_t* planes[kChannels * kMendingFrames];
   float inverse[kChannels * kMendingFrames];
@@ -263,8 +314,17 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
     recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
     recollection.older_frames = old;
   }
+  FirstLooks first_looks;
+  if (absorbed_now_.any()) {
+    std::vector<int64_t> numbers(static_cast<size_t>(count));
+    for (int i = 0; i < count; ++i)
+      numbers[static_cast<size_t>(i)] =
+          i < old ? memory_.number(i)
+                  : first_number() + stride_ * (int64_t{i - old} * m / of_window);
+    first_looks = absorbed_now_.first_looks(numbers);
+  }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
-                               room_.pool);
+                               room_.pool, first_looks);
   if (stable_.another_scene && old > 0) {
     memory_.forget();
     earlier_.forget();
@@ -381,6 +441,7 @@ void RobustLearner::decompose(const SnapshotRange& snapshots) {
                     static_cast<float>(seen - frames_seen_) / static_cast<float>(snapshots.size()));
   frames_seen_ = seen;
   if (stream_from_ < 0) stream_from_ = first_number();
+  absorbed_.hand_over(&absorbed_now_);
 }
 
 void RobustLearner::build(Slice, BackgroundModel* model) {

@@ -7,9 +7,11 @@
 #include "core/dmd/decompose.h"
 #include "core/gram/gram.h"
 #include "core/learn/learner.h"
+#include "core/learn/robust/absorbed.h"
 #include "core/learn/robust/earlier.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
+#include "core/learn/robust/scene_watch.h"
 #include "core/learn/robust/stable_frames.h"
 #include "core/learn/robust/standing_looks.h"
 #include "core/passes/fill.h"
@@ -66,9 +68,13 @@ class RobustLearner : public Learner {
   void decompose(const SnapshotRange& snapshots) override;
   void build(Slice slice, BackgroundModel* model) override;
   SolveFacts facts() const override { return facts_; }
-  void publish() override { published_ = 1 - published_; }
+  void publish() override;
 
-  void mend(const SnapshotRange& newest, double t, BackgroundModel* model) override;
+  void mend(const Compared& frame, BackgroundModel* model) override;
+  void set_absorb_frames(int64_t frames) override { absorb_frames_ = frames; }
+
+  SceneSeen scene_of(int slot) override;
+  void begin_scene() override;
 
   bool follows_light() const override { return true; }
   void follow(const std::vector<uint8_t> level[kChannels]) override;
@@ -91,7 +97,9 @@ class RobustLearner : public Learner {
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames() const;
   void keep_some();
-  void replace(const std::vector<int>& cells, const SnapshotRange& newest, const Gain& light,
+  void mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
+            BackgroundModel* model);
+  void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                BackgroundModel* model);
   void end(BackgroundModel* model);
 
@@ -106,6 +114,11 @@ class RobustLearner : public Learner {
   Earlier earlier_;
   FrameMemory memory_;
   StandingLooks looks_;  // of the frames that were compared with the background in use
+  int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
+  Absorbed absorbed_, absorbed_now_;           // so far, and those that the solve knows of
+  SceneWatch scene_;
+  // Another scene was seen; and solves know of it, but no background yet.
+  bool other_scene_ = false, scene_begins_ = false;
   // Of the newest solve: its window, the share of it that no solve before had, of which every
   // stride-th frame is a snapshot of the decomposition, frames that the start compared, and what it
   // found.

@@ -134,7 +134,8 @@ float limit_of(std::span<const float> distance, size_t left_out, std::span<float
 }  // namespace
 
 StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
-                                const Recollection* earlier, Pool* pool) {
+                                const Recollection* earlier, Pool* pool,
+                                const FirstLooks& first_looks) {
   const size_t cells = grid.cells();
   std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
   StableFrames result;
@@ -148,6 +149,14 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
     }
   }
   const int looks = count + (earlier ? 1 : 0);
+  const auto counts = [&](size_t cell, int t) {
+    if (first_looks.from.empty()) return true;
+    return t == count ? first_looks.earlier_counts[cell] != 0 : t >= first_looks.from[cell];
+  };
+  if (!first_looks.from.empty())
+    for (int t = 0; t < looks; ++t)
+      for (size_t cell = 0; cell < cells; ++cell)
+        if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
   std::vector<int> from(cells, 0);
   std::vector<float> most(density.begin(), density.begin() + static_cast<ptrdiff_t>(cells));
   for (int t = 1; t < looks; ++t) {
@@ -183,7 +192,12 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
       if (earlier && (from[cell] == count || from[cell] < earlier->older_frames))
         limit = std::min(limit, earlier->limit[cell]);
       result.limit[cell] = limit;
-      result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
+      if (first_looks.from.empty())
+        result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
+      else
+        result.of_cell.take(cell, [&](size_t t) {
+          return of_cell[t] <= limit && counts(cell, static_cast<int>(t));
+        });
     }
   });
   return result;

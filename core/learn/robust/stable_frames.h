@@ -67,12 +67,20 @@ struct Recollection {
   int older_frames = 0;  // of those that are compared with it, the first so many are no news
 };
 
+// The looks of a cell that count: those from `from` on, and the earlier windows' unless
+// `earlier_counts` is 0. Empty: all do.
+struct FirstLooks {
+  std::vector<uint16_t> from;
+  std::vector<uint8_t> earlier_counts;
+};
+
 // frames: `count` pictures in one light, and a further one of the background in earlier windows
 // where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
 // around it that most frames share (the mode of the patches' density), corrected where another
 // frame's region fits its surroundings better: what stands still for long shows by its contour.
 StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
-                                const Recollection* earlier, Pool* pool);
+                                const Recollection* earlier, Pool* pool,
+                                const FirstLooks& first_looks = {});
 // The memory that it takes while it looks for them.
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks);
 

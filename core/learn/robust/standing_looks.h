@@ -21,20 +21,42 @@ class StandingLooks {
 
   // Nothing is known.
   void forget();
-  // The next frame of the stream, its levels divided by `gain`.
-  void follow(const float* const frame[3], const Gain& gain);
+  // The next frame of the stream, its levels divided by `gain`. number: counts frames.
+  void follow(const float* const frame[3], const Gain& gain, int64_t number);
   // Of a cell whose look is known.
   float level(int cell, int channel) const { return looks_.plane(0, channel)[cell]; }
+  // The frame with which its look came. What was hidden for no longer than it had been there goes
+  // on to be what it was.
+  int64_t since(int cell) const { return cells_[static_cast<size_t>(cell)].look.since; }
+
+  // Good until the next call of either:
   // What was uncovered: cells whose look has lasted for kSteady frames and is not the background's,
-  // in regions where the background has the stronger contour. Good until the next call.
+  // in regions where the background has the stronger contour.
   const std::vector<int>& uncovered(const float* const background[3]);
+  // What has stood for `frames` frames: regions of cells whose look is not the background's, half
+  // of which came so long ago, with the cells next to them.
+  const std::vector<int>& stood(const float* const background[3], int64_t frames);
 
  private:
+  struct Look {
+    int64_t since = 0, last = 0;
+    int frames = 0;  // that showed it; 0: there is none
+  };
+  // What it shows, what may become the next look, and the one before.
+  struct Cell {
+    Look look, next, before;
+  };
+  bool shows(size_t cell) const {
+    return cells_[cell].look.frames >= kSteady && cells_[cell].next.frames == 0;
+  }
+  void take_next(size_t cell);
+
   Grid grid_;
-  GridFrames looks_;                      // the look, and what may become the next
-  std::vector<uint16_t> age_, next_age_;  // frames in which the cell showed them
+  GridFrames looks_;  // as in Cell
+  std::vector<Cell> cells_;
+  int64_t number_ = 0;
   std::vector<uint8_t> differs_;
-  std::vector<int> uncovered_;
+  std::vector<int> found_;
 };
 
 }  // namespace qdmd

@@ -20,7 +20,7 @@ constexpr Parameter kParameters[] = {
 
 const EffectInfo kStop = {
     "stop",
-    "intermittent motion: whoever crosses the frame stands still in the middle, then goes on",
+    "intermittent motion: somebody who crosses the frame stands still in the middle, then goes on",
     0,
     0,
     kParameters,

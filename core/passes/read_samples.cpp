@@ -1,0 +1,61 @@
+#include "core/passes/read_samples.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "core/passes/chroma.h"
+
+namespace qdmd {
+namespace {
+
+// Pixels first .. first + count - 1 of a plane of shared samples.
+void spread_pixels(const ChromaShape& shape, const uint8_t* plane, size_t first, size_t count,
+                   uint8_t* to) {
+  const auto width = static_cast<size_t>(shape.width);
+  const auto samples = static_cast<size_t>(shape.chroma_width());
+  while (count > 0) {
+    const size_t y = first / width, x = first % width, part = std::min(count, width - x);
+    const uint8_t* from = plane + y / static_cast<size_t>(shape.rows) * samples + x / 2;
+    // The second pixel of a pair.
+    if (const size_t odd = x % 2; odd == 1) {
+      *to = *from;
+      spread_samples(from + 1, 1, 2, part - 1, to + 1);
+    } else {
+      spread_samples(from, 1, 2, part, to);
+    }
+    first += part, count -= part, to += part;
+  }
+}
+
+}  // namespace
+
+const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
+                            size_t count, uint8_t* room) {
+  const uint8_t* plane = snapshots.plane(index, channel);
+  if (channel == 0 || !snapshots.shape().is_shared()) return plane + first;
+  spread_pixels(snapshots.shape(), plane, first, count, room);
+  return room;
+}
+
+void read_planes(const PlaneSlots& frames, int slot, uint8_t* room, const uint8_t* planes[3]) {
+  for (int c = 0; c < kChannels; ++c) {
+    planes[c] = frames.plane(slot, c);
+    if (c == 0 || !frames.shape().is_shared()) continue;
+    uint8_t* const to = room + static_cast<size_t>(c - 1) * frames.pixels();
+    // Rows that share samples are alike.
+    const ChromaShape& shape = frames.shape();
+    const auto width = static_cast<size_t>(shape.width);
+    for (int y = 0; y < shape.height; ++y) {
+      uint8_t* const row = to + static_cast<size_t>(y) * width;
+      if (y % shape.rows != 0)
+        std::memcpy(row, row - width, width);
+      else
+        spread_samples(planes[c] + static_cast<size_t>(y / shape.rows) *
+                                       static_cast<size_t>(shape.chroma_width()),
+                       1, 2, width, row);
+    }
+    planes[c] = to;
+  }
+}
+
+}  // namespace qdmd

@@ -1,0 +1,140 @@
+// What it takes to get a frame of each format in and a picture of it out. One thread, and the time
+// that it computed, because others may use the machine.
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/foreground/picture.h"
+#include "core/passes/planes.h"
+#include "tests/bench/clock.h"
+
+namespace {
+
+using namespace qdmd;
+using namespace qdmd::bench;
+
+// Where the samples of a channel are: plane, the first sample, distances, and pixels that share
+// one.
+struct ChannelAt {
+  int plane, offset, pixel_stride, columns = 1, rows = 1;
+};
+struct Format {
+  const char* name;
+  std::array<ChannelAt, 4> at;  // pixel_stride 0: no such channel
+};
+constexpr Format kFormats[] = {{"RGBA", {{{0, 0, 4}, {0, 1, 4}, {0, 2, 4}, {0, 3, 4}}}},
+                               {"RGB", {{{0, 0, 3}, {0, 1, 3}, {0, 2, 3}, {}}}},
+                               {"GBR", {{{2, 0, 1}, {0, 0, 1}, {1, 0, 1}, {}}}},
+                               {"I420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {}}}},
+                               {"A420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {3, 0, 1}}}},
+                               {"NV12", {{{0, 0, 1}, {1, 0, 2, 2, 2}, {1, 1, 2, 2, 2}, {}}}},
+                               {"Y42B", {{{0, 0, 1}, {1, 0, 1, 2, 1}, {2, 0, 1, 2, 1}, {}}}},
+                               {"NV16", {{{0, 0, 1}, {1, 0, 2, 2, 1}, {1, 1, 2, 2, 1}, {}}}},
+                               {"YUY2", {{{0, 0, 2}, {0, 1, 4, 2, 1}, {0, 3, 4, 2, 1}, {}}}},
+                               {"Y444", {{{0, 0, 1}, {1, 0, 1}, {2, 0, 1}, {}}}},
+                               {"AYUV", {{{0, 1, 4}, {0, 2, 4}, {0, 3, 4}, {0, 0, 4}}}},
+                               {"GRAY8", {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {}}}}};
+
+bool is_rgb(const Format& format) {
+  const std::string name = format.name;
+  return name.find("GRAY") != 0 && name.find('R') != std::string::npos;
+}
+
+// A frame of a format, planes for it, and a background.
+struct Scene {
+  int width, height;
+  std::vector<uint8_t> planes[4], x[3], mask;
+  MutableImageView view;
+  BackgroundModel model;
+  Levels levels;
+
+  Scene(const Format& format, int width_, int height_) : width(width_), height(height_) {
+    const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+    std::array<ptrdiff_t, 4> stride{};
+    for (const ChannelAt& at : format.at)
+      stride[static_cast<size_t>(at.plane)] =
+          std::max<ptrdiff_t>(stride[static_cast<size_t>(at.plane)],
+                              (width + at.columns - 1) / at.columns * at.pixel_stride);
+    view.width = width, view.height = height;
+    bool even = true;
+    for (size_t c = 0; c < 4; ++c) {
+      const ChannelAt& at = format.at[c];
+      if (at.pixel_stride == 0) continue;
+      const auto plane = static_cast<size_t>(at.plane);
+      planes[plane].resize(static_cast<size_t>(stride[plane] * height), 90);
+      (c < 3 ? view.channel[c] : view.alpha) = planes[plane].data() + at.offset;
+      view.own[c] = {at.pixel_stride, stride[plane], at.columns, at.rows};
+      even = even && view.own[c] == view.own[0];
+    }
+    if (even) {
+      view.pixel_stride = view.own[0].pixel_stride, view.row_stride = view.own[0].row_stride;
+      for (Spacing& own : view.own) own = {};
+    }
+    if (!is_rgb(format)) levels = {{16, 128, 128}, {235, 128, 128}};
+    for (auto& plane : x) plane.resize(pixels, 100);
+    for (size_t p = 0; p < pixels; ++p) mask.push_back(p % 300 < 30 ? 255 : 0);
+    model.make_room(pixels, false);
+    model.freeze_as(x, nullptr, pixels);
+    model.set_time(0);
+  }
+
+  void split() {
+    ImageView in;
+    in.width = width, in.height = height;
+    in.pixel_stride = view.pixel_stride, in.row_stride = view.row_stride;
+    for (int c = 0; c < 3; ++c) in.channel[c] = view.channel[c];
+    in.alpha = view.alpha;
+    for (int c = 0; c < 4; ++c) in.own[c] = view.own[c];
+    uint8_t* const to[3] = {x[0].data(), x[1].data(), x[2].data()};
+    benchmark::DoNotOptimize(split_channels(in, 0, height, 90, to));
+  }
+  void write(Output output) {
+    OutputTask task = {};
+    for (int c = 0; c < 3; ++c) task.x[c] = x[c].data();
+    task.model = &model, task.output = output, task.mask = mask.data(), task.constant_alpha = 255;
+    write_picture(task, levels, view, 0, height);
+  }
+};
+
+template <typename Work>
+void add(const Format& format, const char* what, int width, int height, Work work) {
+  const std::string name = std::string(what) + "/" + format.name + "/" + std::to_string(width) +
+                           "x" + std::to_string(height);
+  benchmark::RegisterBenchmark(
+      name.c_str(),
+      [=](benchmark::State& state) {
+        Scene scene(format, width, height);
+        double seconds = 0;
+        int64_t turns = 0;
+        for (auto _ : state) {
+          const double took = seconds_of([&] { work(scene); }, CLOCK_THREAD_CPUTIME_ID);
+          state.SetIterationTime(took);
+          seconds += took, ++turns;
+        }
+        state.counters["ns_a_pixel"] =
+            1e9 * seconds / static_cast<double>(turns) / (static_cast<double>(width) * height);
+      })
+      ->UseManualTime()
+      ->Unit(benchmark::kMicrosecond);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (const auto& [width, height] : {std::pair{160, 120}, {768, 576}, {1920, 1080}})
+    for (const Format& format : kFormats) {
+      add(format, "in", width, height, [](Scene& scene) { scene.split(); });
+      for (const auto& [what, output] : {std::pair{"background", Output::background},
+                                         {"foreground", Output::foreground},
+                                         {"mask", Output::mask},
+                                         {"cutout", Output::cutout}})
+        add(format, what, width, height, [output = output](Scene& scene) { scene.write(output); });
+    }
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
