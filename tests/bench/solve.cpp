@@ -131,7 +131,7 @@ DmdOptions every_mode() {
 }
 
 void frames(benchmark::internal::Benchmark* benchmark) {
-  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Unit(benchmark::kMillisecond);
+  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Arg(300)->Unit(benchmark::kMillisecond);
 }
 // 100 frames of the complex adjoint take seconds.
 void few_frames(benchmark::internal::Benchmark* benchmark) {
@@ -140,7 +140,9 @@ void few_frames(benchmark::internal::Benchmark* benchmark) {
 
 // The default first, then its parts and the other solvers.
 void solve_gram(benchmark::State& s) { solve(s, options(Solver::gram)); }
+void solve_auto(benchmark::State& s) { solve(s, options(Solver::automatic)); }
 BENCHMARK(solve_gram)->Apply(frames);
+BENCHMARK(solve_auto)->Apply(frames);
 
 BENCHMARK(cholesky_double)->Apply(frames);
 BENCHMARK(cholesky_double_double)->Apply(frames);
@@ -153,6 +155,8 @@ BENCHMARK(schur_form)->Apply(frames);
 void solve_gram_first_frame(benchmark::State& s) {
   solve(s, options(Solver::gram, 0, Amplitude::first_frame));
 }
+void solve_gram_rank_1(benchmark::State& s) { solve(s, options(Solver::gram, 1)); }
+void solve_auto_rank_1(benchmark::State& s) { solve(s, options(Solver::automatic, 1)); }
 void solve_gram_rank_3(benchmark::State& s) { solve(s, options(Solver::gram, 3)); }
 void solve_gram_every_mode(benchmark::State& s) { solve(s, every_mode()); }
 void solve_gram_extended(benchmark::State& s) { solve(s, options(Solver::gram_extended)); }
@@ -164,6 +168,8 @@ void solve_adjoint(benchmark::State& s) { solve(s, options(Solver::adjoint)); }
 void solve_dmd(benchmark::State& s) { solve(s, options(Solver::gram), true); }
 
 BENCHMARK(solve_gram_first_frame)->Apply(frames);
+BENCHMARK(solve_gram_rank_1)->Apply(frames);
+BENCHMARK(solve_auto_rank_1)->Apply(frames);
 BENCHMARK(solve_gram_rank_3)->Apply(frames);
 BENCHMARK(solve_gram_every_mode)->Apply(frames);
 BENCHMARK(solve_gram_extended)->Apply(frames);
