@@ -1,6 +1,7 @@
 #include "core/dmd/error_bound.h"
 
 #include "core/dmd/estimator.h"
+#include "core/dmd/first_order.h"
 
 #include <cmath>
 #include <cstdint>
@@ -25,30 +26,12 @@ constexpr double kRoom = 30;
 // many times the mean. One that is not spread out has less room, that of `largest` itself.
 constexpr double kPeak = 6;
 
-// Numbers between -1 and 1 that repeat from run to run, of mean square 1/3.
-class Random {
- public:
-  explicit Random(uint64_t seed) : state_(2 * seed + 1) {}
-  // Every part of mean square `size`^2.
-  Quaterniond operator()(double size) {
-    const double w = next(), x = next(), y = next(), z = next();
-    return Quaterniond(w, x, y, z) * (size * std::sqrt(3.0));
-  }
-
- private:
-  double next() {
-    state_ = state_ * 6364136223846793005u + 1442695040888963407u;
-    return static_cast<double>(static_cast<int64_t>(state_) >> 11) * 0x1p-52;
-  }
-  uint64_t state_;
-};
-
 // Quaternions of mean square size^2.
 QuaternionMatrixd random_matrix(Index rows, Index cols, double size, uint64_t seed) {
-  Random random(seed);
+  RepeatedRandom random(seed);
   QuaternionMatrixd m(rows, cols);
   for (Index c = 0; c < cols; ++c)
-    for (Index r = 0; r < rows; ++r) m.set(r, c, random(size / 2));
+    for (Index r = 0; r < rows; ++r) m.set(r, c, random(size));
   return m;
 }
 
@@ -70,8 +53,9 @@ double longest_column(const QuaternionMatrixd& r) {
 // The movement of a mode's |omega| and of its distance to the next one's.
 struct Movement {
   double omega = 0, margin = 0;
-  void see(const BackgroundModes& modes, const BackgroundModes& moved) {
-    const double change = std::abs(modes.summary.omega - moved.summary.omega);
+  // `times` what was asked for.
+  void see(const BackgroundModes& modes, const BackgroundModes& moved, double times = 1) {
+    const double change = std::abs(modes.summary.omega - moved.summary.omega) / times;
     if (!(change <= omega)) omega = change;
     // Where neither is a bound only; infinite margins have no next mode.
     if (modes.selection.exact && moved.selection.exact &&
@@ -84,6 +68,92 @@ struct Movement {
     return !(modes.selection.margin > room * (2 * omega + margin));
   }
 };
+
+// The root of the mean square of what rounding moves in a factor's or Gram matrix's elements:
+// errors of m sums add up like random numbers, a few epsilon times the root of m. In a Gram matrix
+// of frames that are alike, all but the first product is small beside its elements.
+Push rounding_push(const SolvedWindow& solved) {
+  const auto& [gram, pixels, options, factor, modes] = solved;
+  const auto m = static_cast<double>(gram.cols());
+  Push push;
+  if (factor.squared)
+    push.products = 4 * kEpsilon * gram.a.diagonal().real().maxCoeff();
+  else
+    push.frames = 4 * std::sqrt(m) * kEpsilon * std::max(1.0, modes.selection.operator_size) *
+                  longest_column(factor.r) / std::sqrt(static_cast<double>(factor.r.rows()));
+  push.residual = std::max(modes.summary.residual, kEpsilon);
+  return push;
+}
+
+int directions(Index frames, int few) { return frames < kManyFrames ? few : 1; }
+
+// The largest of the directions, and room for those that nobody tried.
+double with_room(const BackgroundDistance& moved) {
+  return std::max(moved.largest, kRoom * std::min(moved.largest, kPeak * moved.mean));
+}
+
+// rounding_bound() from derivatives alone. Empty where these do not tell, or too little.
+std::optional<double> first_order_bound(const SolvedWindow& solved) {
+  // What is larger may be more than a derivative can say.
+  constexpr double kSmall = 1e-4, kSureLevels = 1e-2;
+  const auto& [gram, pixels, options, factor, modes] = solved;
+  const Index m = gram.cols();
+  const Push push = rounding_push(solved);
+  BackgroundDistance moved_by;
+  Movement movement;
+  for (int direction = 1; direction <= directions(m, kDirections); ++direction) {
+    const auto move =
+        first_order_move(factor, options, modes, push, static_cast<uint64_t>(direction));
+    if (!move || !(kRoom * move->relative < kSmall)) return std::nullopt;
+    if (modes.selection.margin < kInfinity) {
+      // Another mode comes near the origin only if Q~ moves by more than 1 / reach.
+      const double condition = modes.summary.condition, root = std::sqrt(static_cast<double>(m));
+      const double moves = kRoom * 4 * kEpsilon * root * (1 + move->operator_size) * condition *
+                           (factor.squared ? condition : 1);
+      if (!(moves * move->reach < 0.25) || !(moves < modes.selection.margin / 4))
+        return std::nullopt;
+    }
+    const auto distance = background_distance(factor.r, pixels, modes, move->modes);
+    moved_by.largest = std::max(moved_by.largest, distance.largest / move->times);
+    moved_by.mean = std::max(moved_by.mean, distance.mean / move->times);
+    movement.see(modes, move->modes, move->times);
+  }
+  const double bound = with_room(moved_by);
+  if (movement.may_choose_another(modes, kRoom) || !(bound < kSureLevels)) return std::nullopt;
+  return bound;
+}
+
+// The part of the frames' own movement in L(t), and that of the modes.
+double with_own_movement(const BackgroundModes& modes, double moved) {
+  const Index m = modes.combination.rows();
+  double largest = 0;
+  for (Index t : {Index{0}, m / 2, m - 1})
+    largest = std::max(largest, shares_at(modes, static_cast<double>(t)).norm());
+  // Half a level at random has the mean square 1/12.
+  return std::hypot(moved, largest / std::sqrt(12.0));
+}
+
+// sensitivity() from derivatives alone, as above.
+std::optional<double> first_order_sensitivity(const SolvedWindow& solved) {
+  constexpr double kSmall = 0.1;
+  const auto& [gram, pixels, options, factor, modes] = solved;
+  const Index m = gram.cols();
+  Push push;
+  push.frames = 0.5;
+  push.common = std::max(pixels, static_cast<double>(factor.r.rows())) / 4;
+  double mean = 0;
+  Movement movement;
+  for (int direction = 1; direction <= directions(m, kDataDirections); ++direction) {
+    const auto move =
+        first_order_move(factor, options, modes, push, 100 + static_cast<uint64_t>(direction));
+    if (!move || !(move->relative < kSmall)) return std::nullopt;
+    mean = std::max(mean, background_distance(factor.r, pixels, modes, move->modes).mean /
+                              move->times);
+    movement.see(modes, move->modes, move->times);
+  }
+  if (movement.may_choose_another(modes, 1)) return std::nullopt;
+  return with_own_movement(modes, mean);
+}
 
 }  // namespace
 
@@ -101,23 +171,24 @@ QuaternionMatrixd shares_at(const BackgroundModes& modes, double t) {
 BackgroundDistance background_distance(const QuaternionMatrixd& r, double pixels,
                                        const BackgroundModes& modes, const BackgroundModes& other) {
   const Index m = modes.combination.rows();
-  // Frames less their mean: what is common to all has the sum of the shares alone.
-  QuaternionMatrixd around = r;
-  const Eigen::VectorXcd mean_a = r.a.rowwise().mean(), mean_b = r.b.rowwise().mean();
-  around.a.colwise() -= mean_a;
-  around.b.colwise() -= mean_b;
+  const QuaternionMatrixd mean_frame(r.a.rowwise().mean(), r.b.rowwise().mean());
   BackgroundDistance result;
   for (Index t : {Index{0}, m / 2, m - 1}) {
     const auto shares =
         shares_at(modes, static_cast<double>(t)) - shares_at(other, static_cast<double>(t));
-    const double whole = (r * shares).norm();
-    const double sum = std::hypot(std::abs(shares.a.sum()), std::abs(shares.b.sum()));
+    const auto picture = r * shares;
+    const double whole = picture.norm();
+    const Quaterniond total(shares.a.sum(), shares.b.sum());
+    // Frames less their mean: what is common to all has the sum of the shares alone.
+    auto common = mean_frame;
+    common.scale_col(0, total);
+    const double sum = total.norm(), around = (picture - common).norm();
     double absolute = 0;
     for (Index s = 0; s < m; ++s) absolute += shares.get(s, 0).norm();
     // Three bounds of one pixel: of the whole picture's norm; of frames that are white at most; of
     // their mean, which is white at most, and the norm of what is around it.
     const double largest =
-        std::min({whole, kWhite * absolute, kWhite * sum + (around * shares).norm()});
+        std::min({whole, kWhite * absolute, kWhite * sum + around});
     if (!(largest <= result.largest)) result.largest = largest;
     const double mean = whole / std::sqrt(3 * pixels);
     if (!(mean <= result.mean)) result.mean = mean;
@@ -133,27 +204,21 @@ double rounding_bound(const SolvedWindow& solved) {
   if (modes.eigenvalues.size() == 0) return 0;
   // Where the tolerance would be met by other digits, nobody knows.
   if (modes.selection.dependent) return kInfinity;
-  // Errors of m sums add up like random numbers: a few epsilon times the root of m. In a Gram
-  // matrix of frames that are alike, all but the first product is small beside its elements.
-  const double size = factor.squared ? 4 * kEpsilon
-                                     : 4 * std::sqrt(static_cast<double>(m)) * kEpsilon *
-                                           std::max(1.0, modes.selection.operator_size);
+  if (const auto bound = first_order_bound(solved)) return *bound;
+  const Push push = rounding_push(solved);
   BackgroundDistance moved_by;
   Movement movement;
-  for (int direction = 1; direction <= (m < kManyFrames ? kDirections : 1); ++direction) {
+  for (int direction = 1; direction <= directions(m, kDirections); ++direction) {
     const auto seed = static_cast<uint64_t>(direction);
     SnapshotFactor<double> moved;
     if (factor.squared) {
       // G + dG.
-      const double scale = gram.a.diagonal().real().maxCoeff();
-      const auto half = random_matrix(m, m, size * scale * std::sqrt(0.5), seed);
+      const auto half = random_matrix(m, m, push.products * std::sqrt(0.5), seed);
       moved = factorize_gram(gram + half + half.conjugate_transpose());
     } else {
       // R + dR.
       moved = factor;
-      moved.r += random_matrix(
-          moved.r.rows(), m,
-          size * longest_column(factor.r) / std::sqrt(static_cast<double>(moved.r.rows())), seed);
+      moved.r += random_matrix(moved.r.rows(), m, push.frames, seed);
       if (moved.triangular) moved.r = qr(std::move(moved.r), false).r;
     }
     const auto other = solve_factor(moved, options);
@@ -163,16 +228,17 @@ double rounding_bound(const SolvedWindow& solved) {
     movement.see(modes, other);
   }
   if (movement.may_choose_another(modes, kRoom)) return kInfinity;
-  return std::max(moved_by.largest, kRoom * std::min(moved_by.largest, kPeak * moved_by.mean));
+  return with_room(moved_by);
 }
 
 double sensitivity(const SolvedWindow& solved) {
   const auto& [gram, pixels, options, factor, modes] = solved;
   const Index m = gram.cols(), rank = factor.r.rows();
   if (modes.eigenvalues.size() == 0) return 0;
+  if (const auto moved = first_order_sensitivity(solved)) return *moved;
   double mean = 0;
   Movement movement;
-  for (int direction = 1; direction <= (m < kManyFrames ? kDataDirections : 1); ++direction) {
+  for (int direction = 1; direction <= directions(m, kDataDirections); ++direction) {
     // Three channels, each of mean square 1/12: 1/4 for a pixel, and along any unit vector.
     const uint64_t seed = 100 + static_cast<uint64_t>(direction);
     SnapshotFactor<double> moved;
@@ -200,7 +266,7 @@ double sensitivity(const SolvedWindow& solved) {
     if (!(distance <= mean)) mean = distance;
     movement.see(modes, other);
   }
-  return movement.may_choose_another(modes, 1) ? kInfinity : mean;
+  return movement.may_choose_another(modes, 1) ? kInfinity : with_own_movement(modes, mean);
 }
 
 }  // namespace qdmd

@@ -33,7 +33,6 @@ enum class Estimator {
 struct DmdOptions {
   Solver solver = Solver::automatic;
   Amplitude amplitude = Amplitude::window;
-  Estimator estimator = Estimator::exact;
   // Rank of the truncated decomposition; 0, or more than the numerical rank: full.
   int rank = 0;
   // Background: all modes with |omega| <= this, in rad/frame. 0, or no mode that near: the one
@@ -42,6 +41,7 @@ struct DmdOptions {
   // The most modes that count as background (of exact DMD: in each channel), the nearest to the
   // origin first; 0: no limit.
   int max_modes = 0;
+  Estimator estimator = Estimator::exact;
 };
 
 // Facts about one solve, of the mode nearest the origin (for exact DMD: of the channel whose
