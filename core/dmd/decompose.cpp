@@ -82,6 +82,7 @@ namespace {
 double most_matrices(const DmdOptions& options) {
   // Beside a solve: the Gram matrix, and what is moved to see how sure it is.
   constexpr double kSure = 2;
+  if (options.spectrum) return 14 + kSure;
   // The amplitudes of all modes at once, by Eigen on the complex adjoint.
   if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14 + kSure;
   // Singular values: from a Hermitian matrix's eigenvectors, or without squaring.

@@ -147,8 +147,8 @@ std::optional<double> first_order_sensitivity(const SolvedWindow& solved) {
     const auto move =
         first_order_move(factor, options, modes, push, 100 + static_cast<uint64_t>(direction));
     if (!move || !(move->relative < kSmall)) return std::nullopt;
-    mean = std::max(mean, background_distance(factor.r, pixels, modes, move->modes).mean /
-                              move->times);
+    mean = std::max(mean,
+                    background_distance(factor.r, pixels, modes, move->modes).mean / move->times);
     movement.see(modes, move->modes, move->times);
   }
   if (movement.may_choose_another(modes, 1)) return std::nullopt;
@@ -187,8 +187,7 @@ BackgroundDistance background_distance(const QuaternionMatrixd& r, double pixels
     for (Index s = 0; s < m; ++s) absolute += shares.get(s, 0).norm();
     // Three bounds of one pixel: of the whole picture's norm; of frames that are white at most; of
     // their mean, which is white at most, and the norm of what is around it.
-    const double largest =
-        std::min({whole, kWhite * absolute, kWhite * sum + around});
+    const double largest = std::min({whole, kWhite * absolute, kWhite * sum + around});
     if (!(largest <= result.largest)) result.largest = largest;
     const double mean = whole / std::sqrt(3 * pixels);
     if (!(mean <= result.mean)) result.mean = mean;

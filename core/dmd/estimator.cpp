@@ -4,17 +4,13 @@
 #include <cmath>
 #include <optional>
 
+#include "core/dmd/matrix_root.h"
+
 namespace qdmd {
 namespace {
 
 using Index = Eigen::Index;
 using Matrix = QuaternionMatrixd;
-
-// A^-1 for square A; not finite where A is singular.
-Matrix inverse(const Matrix& a) {
-  const auto factors = qr(a);
-  return solve_upper(factors.r, factors.q.conjugate_transpose());
-}
 
 // Not a number is no result.
 std::optional<BackgroundModes> checked(std::optional<BackgroundModes> modes, Index rank,
@@ -38,16 +34,12 @@ std::optional<BackgroundModes> forward_backward_modes(const SnapshotFactor<doubl
   const auto past_h = past.conjugate_transpose(), next_h = next.conjugate_transpose();
   // A_f = (Y X^H) (X X^H)^-1 and A_b^-1 = (Y Y^H) (X Y^H)^-1.
   const Matrix forward = (next * past_h) * inverse(past * past_h);
-  const internal::Projection<double> projection{spectrum.v_over_s,
-                                                forward * (next * next_h) * inverse(past * next_h)};
-  if (!projection.q_tilde.all_finite()) return std::nullopt;
-  const auto root = [&](const std::complex<double>& value, const Matrix& w) {
-    const std::complex<double> principal = std::sqrt(value);
-    // Time that alternates has the root -1 of 1.
-    const double side = (w.conjugate_transpose() * (forward * w)).get(0, 0).w;
-    return side < 0 ? -principal : principal;
-  };
-  return checked(internal::modes_from_schur_form(projection, factor, options, root), rank,
+  const Matrix square = forward * (next * next_h) * inverse(past * next_h);
+  if (!square.all_finite()) return std::nullopt;
+  const auto root = root_near(square, forward);
+  if (!root) return std::nullopt;
+  const internal::Projection<double> projection{spectrum.v_over_s, *root};
+  return checked(internal::modes_from_schur_form(projection, factor, options), rank,
                  spectrum.sigma(0) / spectrum.sigma(rank - 1));
 }
 

@@ -7,12 +7,13 @@ namespace qdmd {
 
 // The background modes by options.estimator: reduced_qdmd() for Estimator::exact.
 //
-// forward_backward (Dawson et al. 2016): the eigenvectors of A_f A_b^-1, and the roots of its
-// eigenvalues that lie as those of A_f do; A_f = Q~, A_b the same of time turned back.
-// Where lambda and -lambda are both eigenvalues, their modes are mixed.
+// forward_backward (Dawson et al. 2016): the square root of A_f A_b^-1 that is nearest to A_f = Q~;
+// A_b is the same of time turned back. Where it finds none, the result is that of exact.
 // total (Hemati et al. 2017): X and Y times the projection on the leading right singular vectors
 // of [X; Y], then as the paper.
-// Both are the paper's own at full rank, where nothing is left out: rank 0 means 1 for them.
+// At full rank both are the paper's own: X and Y then span the same, time can be turned back
+// without a rest, and no projection takes noise away. Rank 0 would make them idle, so it means 1
+// for them.
 //
 // optimized (Askham and Kutz 2018): the background's modes, as many as Estimator::exact chooses
 // with the same options, are fitted to all frames by variable projection: the eigenvalues minimize

@@ -28,7 +28,9 @@ Matrix times(Matrix column, const Quaterniond& q) {
 }
 
 // x^H y of columns.
-Quaterniond dot(const Matrix& x, const Matrix& y) { return (x.conjugate_transpose() * y).get(0, 0); }
+Quaterniond dot(const Matrix& x, const Matrix& y) {
+  return (x.conjugate_transpose() * y).get(0, 0);
+}
 
 // What x_t has in (Y - X lambda) v, m x 1.
 Matrix shares_of_residual(const Matrix& v, const Quaterniond& lambda) {
@@ -44,8 +46,8 @@ Matrix shares_of_residual(const Matrix& v, const Quaterniond& lambda) {
 
 // How a mode's vector moves.
 struct Step {
-  Matrix dv;                  // m - 1 x 1
-  Quaterniond dlambda;        // of v's own representative, beside what dv does to it
+  Matrix dv;                   // m - 1 x 1
+  Quaterniond dlambda;         // of v's own representative, beside what dv does to it
   double reach = 0, size = 1;  // as in FirstOrderMove, and |Q~|
 };
 
@@ -88,8 +90,7 @@ class FullRank {
       const Quaterniond along = unit * dot(z_, moved);
       result.dv -= times(v_, along);
       moved -= times(z_, along);
-      if (k == 0)
-        result.reach = std::sqrt(static_cast<double>(past)) * moved.norm() / f.norm();
+      if (k == 0) result.reach = std::sqrt(static_cast<double>(past)) * moved.norm() / f.norm();
       Matrix rest = h_ * result.dv + f - times(moved, lambda_);
       result.dlambda = unit * dot(z_, rest);
       rest -= times(z_, result.dlambda);
@@ -111,8 +112,7 @@ class FullRank {
     products.b += push.common * shares.b.topRows(past);
     auto column = internal::to_column(products);
     solve_upper_adjoint_in_place(triangle, column);
-    const double left =
-        push.residual * (h_.norm() + lambda_.norm() * r11_.norm()) * v_.norm();
+    const double left = push.residual * (h_.norm() + lambda_.norm() * r11_.norm()) * v_.norm();
     return internal::to_matrix(column) +
            random_column(past,
                          push.frames * shares.norm() + left / std::sqrt(static_cast<double>(past)),
@@ -163,10 +163,9 @@ class RankOne {
       product = upright(product);
       if (!((product - before).norm() <= kMissing * g.norm())) continue;
       // A quotient of two products, whatever the vector.
-      result.dlambda = (*random)(2 * (length * (push.products * length +
-                                                push.frames * (size + after)) /
-                                          (size * size) +
-                                      push.residual));
+      result.dlambda = (*random)(
+          2 * (length * (push.products * length + push.frames * (size + after)) / (size * size) +
+               push.residual));
       const Index inner = w.rows() - 1;
       result.dlambda += (dot(w.block(1, 0, inner, 1), w.block(0, 0, inner, 1)) -
                          lambda_of(w) * (length * length)) *
@@ -200,18 +199,17 @@ void fit_moved(const Matrix& r, const Push& push, double so_often, RepeatedRando
   const auto phi_h = phi.conjugate_transpose();
   Matrix phi_phi = phi_h * phi, phi_x = phi_h * r;
   phi_phi.a(0, 0) +=
-      so_often *
-      (push.common * length * length +
-       (*random)(push.products * length * length + 2 * push.frames * size * length).w);
+      so_often * (push.common * length * length +
+                  (*random)(push.products * length * length + 2 * push.frames * size * length).w);
   const double moved = push.products * length + push.frames * (size + length * longest);
   for (Index t = 0; t < r.cols(); ++t)
-    phi_x.set(0, t,
-              phi_x.get(0, t) + ((*random)(moved) + modes->combination.get(t, 0).conj() *
-                                                        push.common) *
-                                    so_often);
+    phi_x.set(
+        0, t,
+        phi_x.get(0, t) +
+            ((*random)(moved) + modes->combination.get(t, 0).conj() * push.common) * so_often);
   modes->reference_times(0) = fit_reference_time(modes->eigenvalues(0), r.cols());
-  modes->amplitudes = fit_window_amplitudes<double>(modes->eigenvalues, modes->reference_times,
-                                                    phi_phi, phi_x);
+  modes->amplitudes =
+      fit_window_amplitudes<double>(modes->eigenvalues, modes->reference_times, phi_phi, phi_x);
 }
 
 }  // namespace
@@ -226,8 +224,8 @@ std::optional<FirstOrderMove> first_order_move(const SnapshotFactor<double>& fac
     return std::nullopt;
   const Quaterniond lambda(modes.eigenvalues(0));
   const bool one = modes.summary.rank == 1 && options.estimator != Estimator::optimized;
-  const bool full = modes.summary.rank == past && factor.triangular &&
-                    options.estimator == Estimator::exact;
+  const bool full =
+      modes.summary.rank == past && factor.triangular && options.estimator == Estimator::exact;
   // Powers of a mode that is gone after some frames move as no derivative says.
   if (!(one || full) || !(lambda.norm() > 0.5)) return std::nullopt;
 

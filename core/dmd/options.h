@@ -3,6 +3,8 @@
 
 #include <complex>
 #include <limits>
+#include <memory>
+#include <vector>
 
 namespace qdmd {
 
@@ -42,6 +44,16 @@ struct DmdOptions {
   // origin first; 0: no limit.
   int max_modes = 0;
   Estimator estimator = Estimator::exact;
+  // DmdSummary::spectrum is wanted; costs a solve for all modes. Not of exact DMD.
+  bool spectrum = false;
+};
+
+// One mode of a decomposition.
+struct SpectrumMode {
+  std::complex<double> lambda;  // imaginary part >= 0
+  double amplitude = 0;  // levels: root of the mean square, over pixels and channels, of its share
+                         // of L where it is largest in the window
+  bool background = false;
 };
 
 // Facts about one solve, of the mode nearest the origin (for exact DMD: of the channel whose
@@ -66,6 +78,9 @@ struct DmdSummary {
   // Root of the mean square of L(t)'s movement, in levels, when every level of the frames moves at
   // random by up to a half; infinite where another mode may become the nearest one.
   double sensitivity = std::numeric_limits<double>::infinity();
+  // Where it was asked for: all modes, the nearest to the origin first. By the estimator that was
+  // asked for; Estimator::optimized has no other modes than the background's: the exact ones.
+  std::shared_ptr<const std::vector<SpectrumMode>> spectrum;
 };
 
 }  // namespace qdmd

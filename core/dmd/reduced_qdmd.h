@@ -107,41 +107,15 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   return result;
 }
 
-// The eigenvalue of the Schur form as it is.
-struct SameEigenvalue {
-  template <typename Real>
-  std::complex<Real> operator()(const std::complex<Real>& value,
-                                const QuaternionMatrix<Real>& /*vector*/) const {
-    return value;
-  }
-};
-
 // All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
-// `eigenvalue`: from an eigenvalue of Q~ and its vector to that of the modes.
-template <typename Real, typename Eigenvalue = SameEigenvalue>
+template <typename Real>
 std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real>& projection,
                                                            const SnapshotFactor<Real>& factor,
-                                                           const DmdOptions& options,
-                                                           const Eigenvalue& eigenvalue = {}) {
+                                                           const DmdOptions& options) {
   const Eigen::Index m = factor.r.cols(), rank = projection.q_tilde.rows();
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
-  const ComplexVector<Real> of_operator = form.eigenvalues();
-  ComplexVector<Real> eigenvalues = of_operator;
-  // Those in whose vectors' own coordinates the imaginary part is negative: j turns them.
-  std::vector<bool> turned(static_cast<size_t>(rank));
-  if constexpr (!std::is_same_v<Eigenvalue, SameEigenvalue>)
-    for (Eigen::Index k = 0; k < rank; ++k) {
-      const auto value = eigenvalue(of_operator(k), form.q * triangular_eigenvector(form.t, k));
-      turned[static_cast<size_t>(k)] = value.imag() < Real(0);
-      eigenvalues(k) = value.imag() < Real(0) ? std::conj(value) : value;
-    }
-  const auto vector = [&](Eigen::Index k) {
-    auto w = triangular_eigenvector(form.t, k);
-    if (turned[static_cast<size_t>(k)])
-      w.scale_col(0, Quaternion<Real>(Real(0), Real(0), Real(1), Real(0)));
-    return w;
-  };
+  const ComplexVector<Real> eigenvalues = form.eigenvalues();
   Selection selection;
   const auto chosen =
       select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
@@ -152,13 +126,12 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   result.selection = selection;
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p) {
     const Eigen::Index k = chosen[static_cast<size_t>(p)];
-    const auto w = vector(k);
+    const auto w = triangular_eigenvector(form.t, k);
     result.eigenvalues(p) = eigenvalues(k);
     set_combination(&result, p, coefficients * w);
     if (p == 0)
-      describe_nearest(&result, eigenpair_residual<Real>(projection.q_tilde,
-                                                         form.q * triangular_eigenvector(form.t, k),
-                                                         of_operator(k)));
+      describe_nearest(&result,
+                       eigenpair_residual<Real>(projection.q_tilde, form.q * w, eigenvalues(k)));
   }
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, factor.r * result.combination, factor.r);
@@ -168,7 +141,7 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
     const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0),
                                        &result.selection.dependent);
     const auto b = amplitude_from_left_vector<Real>(triangular_left_eigenvector(form.t, chosen[0]),
-                                                    vector(chosen[0]), a);
+                                                    triangular_eigenvector(form.t, chosen[0]), a);
     if (b) {
       result.amplitudes.set(0, 0, *b);
       return result;
@@ -176,7 +149,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   }
   // Several modes that nearly coincide share the first snapshot: only together are they stable.
   QuaternionModes<Real> all(m, rank);
-  for (Eigen::Index k = 0; k < rank; ++k) set_combination(&all, k, coefficients * vector(k));
+  for (Eigen::Index k = 0; k < rank; ++k)
+    set_combination(&all, k, coefficients * triangular_eigenvector(form.t, k));
   const auto b =
       least_squares<Real>(factor.r * all.combination, factor.r.col(0), &result.selection.dependent);
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p)
@@ -342,7 +316,13 @@ QuaternionModes<Real> reduced_qdmd(const SnapshotFactor<Real>& factor, const Dmd
   return internal::projected_modes(factor, options);
 }
 
+// In double they are compiled once.
 extern template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&,
                                                      const DmdOptions&);
+namespace internal {
+extern template std::optional<QuaternionModes<double>> modes_from_schur_form(
+    const Projection<double>&, const SnapshotFactor<double>&, const DmdOptions&);
+extern template PastSpectrum<double> past_spectrum(const SnapshotFactor<double>&, Eigen::Index);
+}  // namespace internal
 
 }  // namespace qdmd

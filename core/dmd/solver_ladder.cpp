@@ -48,12 +48,47 @@ BackgroundModes mean_of_frames(Index snapshots) {
   return modes;
 }
 
+// All modes of `factor`, by `options`.
+std::vector<SpectrumMode> spectrum_of(const SnapshotFactor<double>& factor, DmdOptions options,
+                                      double pixels, int background_modes) {
+  options.omega_threshold = std::numeric_limits<double>::infinity();
+  options.max_modes = 0;
+  if (options.estimator == Estimator::optimized) options.estimator = Estimator::exact;
+  const auto modes = solve_factor(factor, options);
+  std::vector<SpectrumMode> spectrum;
+  for (Index p = 0; p < modes.eigenvalues.size(); ++p) {
+    auto share = modes.combination.col(p);
+    share.scale_col(0, modes.amplitudes.get(p, 0));
+    double growth = 1;
+    for (double t : {0.0, static_cast<double>(factor.r.cols() - 1)})
+      growth = std::max(
+          growth, std::abs(power<double>(modes.eigenvalues(p), t - modes.reference_times(p))));
+    spectrum.push_back({modes.eigenvalues(p),
+                        growth * (factor.r * share).norm() / std::sqrt(3 * std::max(pixels, 1.0)),
+                        p < background_modes});
+  }
+  return spectrum;
+}
+
 // One window, which solvers try one after another.
 class Ladder {
  public:
   Ladder(const SnapshotRange& snapshots, const QuaternionMatrixd& gram, const DmdOptions& options)
       : snapshots_(snapshots), gram_(gram), options_(options) {}
 
+  BackgroundModes solve() {
+    const DmdOptions asked = options_;
+    auto modes = climb();
+    if (asked.spectrum) {
+      const bool fast = modes.summary.solver == Solver::gram;
+      modes.summary.spectrum = std::make_shared<const std::vector<SpectrumMode>>(
+          spectrum_of(fast ? factorize_gram(gram_) : factorize_gram_extended(gram_), asked,
+                      static_cast<double>(snapshots_.pixels()), modes.summary.background_modes));
+    }
+    return modes;
+  }
+
+ private:
   BackgroundModes climb() {
     // The estimators work on inner products.
     if (options_.estimator != Estimator::exact &&
@@ -84,7 +119,6 @@ class Ladder {
     return last_resort();
   }
 
- private:
   // Rank one for what was asked, and then no rank at all.
   BackgroundModes last_resort() {
     if (options_.rank != 1) {
@@ -169,7 +203,7 @@ BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix g
                                  const DmdOptions& options) {
   const QuaternionMatrixd g = quaternion_gram(gram);
   gram.resize(0, 0);
-  return Ladder(snapshots, g, options).climb();
+  return Ladder(snapshots, g, options).solve();
 }
 
 }  // namespace qdmd

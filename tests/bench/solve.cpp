@@ -131,7 +131,8 @@ DmdOptions every_mode() {
 }
 
 void frames(benchmark::internal::Benchmark* benchmark) {
-  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Arg(300)->Unit(benchmark::kMillisecond);
+  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Arg(300)->Unit(
+      benchmark::kMillisecond);
 }
 // 100 frames of the complex adjoint take seconds.
 void few_frames(benchmark::internal::Benchmark* benchmark) {
@@ -152,6 +153,18 @@ BENCHMARK(hermitian_eigenproblem)->Apply(frames);
 BENCHMARK(singular_values)->Apply(frames);
 BENCHMARK(schur_form)->Apply(frames);
 
+DmdOptions estimated(Estimator estimator, int rank) {
+  DmdOptions result = options(Solver::automatic, rank);
+  result.estimator = estimator;
+  return result;
+}
+void solve_forward_backward(benchmark::State& s) {
+  solve(s, estimated(Estimator::forward_backward, 1));
+}
+void solve_total(benchmark::State& s) { solve(s, estimated(Estimator::total, 1)); }
+void solve_optimized(benchmark::State& s) { solve(s, estimated(Estimator::optimized, 0)); }
+void solve_optimized_rank_1(benchmark::State& s) { solve(s, estimated(Estimator::optimized, 1)); }
+
 void solve_gram_first_frame(benchmark::State& s) {
   solve(s, options(Solver::gram, 0, Amplitude::first_frame));
 }
@@ -167,6 +180,10 @@ void solve_qr(benchmark::State& s) { solve(s, options(Solver::qr)); }
 void solve_adjoint(benchmark::State& s) { solve(s, options(Solver::adjoint)); }
 void solve_dmd(benchmark::State& s) { solve(s, options(Solver::gram), true); }
 
+BENCHMARK(solve_forward_backward)->Apply(frames);
+BENCHMARK(solve_total)->Apply(frames);
+BENCHMARK(solve_optimized)->Apply(frames);
+BENCHMARK(solve_optimized_rank_1)->Apply(frames);
 BENCHMARK(solve_gram_first_frame)->Apply(frames);
 BENCHMARK(solve_gram_rank_1)->Apply(frames);
 BENCHMARK(solve_auto_rank_1)->Apply(frames);

@@ -79,6 +79,57 @@ TEST(Estimator, TurningColoursKeepTheirAngle) {
   }
 }
 
+// A picture, and one that alternates: lambda and -lambda have the same square.
+TEST(Estimator, OppositeModesAreNotMixed) {
+  std::mt19937 rng(95);
+  std::normal_distribution<double> noise(0, 4);
+  const auto still = random_picture(300, rng, 100, 150), other = random_picture(300, rng, 0, 80);
+  Clip clip(300, 16);
+  for (size_t t = 0; t < 16; ++t)
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t p = 0; p < 300; ++p)
+        clip.set(t, c, p,
+                 still[c * 300 + p] + (t % 2 ? -1.0 : 1.0) * other[c * 300 + p] + noise(rng));
+  DmdOptions options;
+  options.rank = 2;
+  const auto x = to_quaternions(clip);
+  for (Estimator estimator : kEstimators) {
+    SCOPED_TRACE(static_cast<int>(estimator));
+    const auto modes = solve(clip, options, estimator);
+    ASSERT_EQ(modes.eigenvalues.size(), 1);
+    EXPECT_NEAR(std::abs(modes.eigenvalues(0) - 1.0), 0, 0.01);
+    const auto background = background_at(x, modes, 8);
+    double error = 0;
+    for (Eigen::Index p = 0; p < 300; ++p) {
+      const Quaterniond truth(0, still[static_cast<size_t>(p)], still[static_cast<size_t>(300 + p)],
+                              still[static_cast<size_t>(600 + p)]);
+      error += (background.get(p, 0) - truth).squared_norm() / (3 * 300);
+    }
+    // Noise that the mean leaves, and no picture of the other mode, whose levels are 40 on average.
+    EXPECT_LT(std::sqrt(error), 4);
+  }
+}
+
+// Nothing is left out there that they could make use of.
+TEST(Estimator, TwoAreThePapersAtFullRank) {
+  std::mt19937 rng(96);
+  const Clip clip = fading(0.99, 5, 200, 8, rng);
+  DmdOptions options;
+  options.rank = 7;
+  const auto exact = solve(clip, options, Estimator::exact);
+  for (Estimator estimator : {Estimator::forward_backward, Estimator::total}) {
+    SCOPED_TRACE(static_cast<int>(estimator));
+    const auto modes = solve(clip, options, estimator);
+    EXPECT_LE(std::abs(modes.eigenvalues(0) - exact.eigenvalues(0)), 1e-8);
+    options.rank = 0;
+    const auto chosen = solve(clip, options, estimator);
+    options.rank = 1;
+    EXPECT_EQ(chosen.eigenvalues(0), solve(clip, options, estimator).eigenvalues(0));
+    EXPECT_EQ(chosen.summary.rank, 1);
+    options.rank = 7;
+  }
+}
+
 // The noise that shrinks |lambda| of the paper's estimate: seeds' mean and its standard error.
 TEST(Estimator, NoiseBendsTheOthersLess) {
   constexpr int kSeeds = 12;
