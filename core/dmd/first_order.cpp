@@ -32,6 +32,27 @@ Quaterniond dot(const Matrix& x, const Matrix& y) {
   return (x.conjugate_transpose() * y).get(0, 0);
 }
 
+// Columns first .. first + rows(x) - 1 of r, times x, and their conjugate transpose times y:
+// without copies of r, which are what this would cost most.
+Matrix columns_times(const Matrix& r, Index first, const Matrix& x) {
+  const auto a = r.a.middleCols(first, x.rows()), b = r.b.middleCols(first, x.rows());
+  Matrix y(r.rows(), 1);
+  y.a.noalias() = a * x.a;
+  y.a.noalias() -= b * x.b.conjugate();
+  y.b.noalias() = a * x.b;
+  y.b.noalias() += b * x.a.conjugate();
+  return y;
+}
+Matrix columns_adjoint_times(const Matrix& r, Index first, Index count, const Matrix& y) {
+  const auto a = r.a.middleCols(first, count), b = r.b.middleCols(first, count);
+  Matrix x(count, 1);
+  x.a.noalias() = a.adjoint() * y.a;
+  x.a.noalias() += b.transpose() * y.b.conjugate();
+  x.b.noalias() = a.adjoint() * y.b;
+  x.b.noalias() -= b.transpose() * y.a.conjugate();
+  return x;
+}
+
 // What x_t has in (Y - X lambda) v, m x 1.
 Matrix shares_of_residual(const Matrix& v, const Quaterniond& lambda) {
   const Index past = v.rows();
@@ -55,11 +76,7 @@ struct Step {
 class FullRank {
  public:
   FullRank(const SnapshotFactor<double>& factor, const Matrix& v, const Quaterniond& lambda)
-      : r11_(factor.r.block(0, 0, v.rows(), v.rows())),
-        h_(factor.r.block(0, 1, v.rows(), v.rows())),
-        v_(v),
-        z_(r11_ * v),
-        lambda_(lambda) {
+      : r_(factor.r), v_(v), z_(r11(v)), lambda_(lambda) {
     // How long the last frame's part is that no other frame has.
     if (factor.r.rows() > v.rows())
       outside_ = factor.r.get(v.rows(), v.rows()).norm() * v.get(v.rows() - 1, 0).norm();
@@ -70,28 +87,29 @@ class FullRank {
     const double size = z_.norm();
     if (!(size > 0)) return std::nullopt;
     const Quaterniond unit = Quaterniond(1 / (size * size));
-    const ScalarGrid<double> triangle(r11_);
+    const ScalarGrid<double> triangle(r_.block(0, 0, past, past));
     Step result;
     {
       auto column = internal::to_column(random_column(past, 1, random));
       solve_upper_in_place(triangle, column);
-      result.size = (h_ * internal::to_matrix(column)).norm();
+      result.size = h(internal::to_matrix(column)).norm();
     }
     const Matrix f = force(push, triangle, random);
     if (!(f.norm() > 0) || !std::isfinite(f.norm())) return std::nullopt;
-    HessenbergQr<double> shifted(h_ - r11_);
-    shifted.raise_pivots(
-        std::max(kEpsilon * (h_.norm() + r11_.norm()), std::numeric_limits<double>::min()));
+    HessenbergQr<double> shifted(
+        Matrix(r_.a.block(0, 1, past, past) - r_.a.topLeftCorner(past, past),
+               r_.b.block(0, 1, past, past) - r_.b.topLeftCorner(past, past)));
+    shifted.raise_pivots(std::max(2 * kEpsilon * r_.norm(), std::numeric_limits<double>::min()));
     const Quaterniond shift = lambda_ - Quaterniond(1.0);
     Matrix moved(past, 1);  // R11 dv
     for (int k = 0; k < kMostSteps; ++k) {
       result.dv = internal::to_matrix(shifted.solve(internal::to_column(times(moved, shift) - f)));
-      moved = r11_ * result.dv;
+      moved = r11(result.dv);
       const Quaterniond along = unit * dot(z_, moved);
       result.dv -= times(v_, along);
       moved -= times(z_, along);
       if (k == 0) result.reach = std::sqrt(static_cast<double>(past)) * moved.norm() / f.norm();
-      Matrix rest = h_ * result.dv + f - times(moved, lambda_);
+      Matrix rest = h(result.dv) + f - times(moved, lambda_);
       result.dlambda = unit * dot(z_, rest);
       rest -= times(z_, result.dlambda);
       if (rest.norm() <= kMissing * f.norm()) return result;
@@ -112,14 +130,20 @@ class FullRank {
     products.b += push.common * shares.b.topRows(past);
     auto column = internal::to_column(products);
     solve_upper_adjoint_in_place(triangle, column);
-    const double left = push.residual * (h_.norm() + lambda_.norm() * r11_.norm()) * v_.norm();
+    const double left = push.residual * (1 + lambda_.norm()) * r_.norm() * v_.norm();
     return internal::to_matrix(column) +
            random_column(past,
                          push.frames * shares.norm() + left / std::sqrt(static_cast<double>(past)),
                          random);
   }
 
-  Matrix r11_, h_, v_, z_;
+  // R11 x and H x.
+  Matrix r11(const Matrix& x) const { return columns_times(r_, 0, x).block(0, 0, x.rows(), 1); }
+  Matrix h(const Matrix& x) const { return columns_times(r_, 1, x).block(0, 0, x.rows(), 1); }
+
+  const Matrix& r_;
+  const Matrix& v_;
+  Matrix z_;
   Quaterniond lambda_;
   double outside_ = 0;
 };
@@ -128,12 +152,10 @@ class FullRank {
 class RankOne {
  public:
   RankOne(const SnapshotFactor<double>& factor, Estimator estimator)
-      : past_(factor.r.left_cols(factor.r.cols() - 1)),
-        next_(factor.r.right_cols(factor.r.cols() - 1)),
-        estimator_(estimator) {}
+      : r_(factor.r), estimator_(estimator) {}
 
   std::optional<Step> step(const Matrix& w, const Push& push, RepeatedRandom* random) const {
-    const Matrix z = past_ * w, y = next_ * w;
+    const Matrix z = past(w), y = next(w);
     const double length = w.norm(), size = z.norm(), after = y.norm();
     if (!(size > 0) || !(length > 0)) return std::nullopt;
     const bool both = estimator_ == Estimator::total;
@@ -145,9 +167,8 @@ class RankOne {
                              push.products * length * (both ? 1.5 : 1.0) + push.frames * image +
                                  push.residual * square * length / std::sqrt(rows),
                              random);
-    g += past_.conjugate_transpose() * random_column(past_.rows(), push.frames * length, random);
-    if (both)
-      g += next_.conjugate_transpose() * random_column(past_.rows(), push.frames * length, random);
+    g += past_adjoint(random_column(r_.rows(), push.frames * length, random));
+    if (both) g += next_adjoint(random_column(r_.rows(), push.frames * length, random));
     const auto upright = [&](const Matrix& x) {
       return x - times(w, Quaterniond(1 / (length * length)) * dot(w, x));
     };
@@ -158,8 +179,8 @@ class RankOne {
     for (int k = 0; k < kMostSteps; ++k) {
       result.dv = times(g + product, Quaterniond(1 / square));
       const Matrix before = product;
-      product = past_.conjugate_transpose() * (past_ * result.dv);
-      if (both) product += next_.conjugate_transpose() * (next_ * result.dv);
+      product = past_adjoint(past(result.dv));
+      if (both) product += next_adjoint(next(result.dv));
       product = upright(product);
       if (!((product - before).norm() <= kMissing * g.norm())) continue;
       // A quotient of two products, whatever the vector.
@@ -177,15 +198,23 @@ class RankOne {
 
   // Of w's own representative.
   Quaterniond lambda_of(const Matrix& w) const {
-    const Matrix z = past_ * w;
-    const Quaterniond product = dot(z, next_ * w);
+    const Matrix z = past(w);
+    const Quaterniond product = dot(z, next(w));
     if (estimator_ != Estimator::forward_backward) return product * (1 / z.squared_norm());
-    const auto z_h = z.conjugate_transpose();
-    return product.unit() * ((z_h * next_).norm() / (z_h * past_).norm());
+    return product.unit() * (next_adjoint(z).norm() / past_adjoint(z).norm());
   }
 
  private:
-  Matrix past_, next_;
+  Matrix past(const Matrix& x) const { return columns_times(r_, 0, x); }
+  Matrix next(const Matrix& x) const { return columns_times(r_, 1, x); }
+  Matrix past_adjoint(const Matrix& y) const {
+    return columns_adjoint_times(r_, 0, r_.cols() - 1, y);
+  }
+  Matrix next_adjoint(const Matrix& y) const {
+    return columns_adjoint_times(r_, 1, r_.cols() - 1, y);
+  }
+
+  const Matrix& r_;
   Estimator estimator_;
 };
 
@@ -241,8 +270,8 @@ std::optional<FirstOrderMove> first_order_move(const SnapshotFactor<double>& fac
   result.modes = modes;
   result.reach = step->reach;
   result.operator_size = step->size;
-  const double image = (factor.r.left_cols(past) * step->dv).norm(),
-               before = (factor.r.left_cols(past) * v).norm();
+  const double image = columns_times(factor.r, 0, step->dv).norm(),
+               before = columns_times(factor.r, 0, v).norm();
   double relative = std::max(image / before, one ? step->dv.norm() / length : 0.0);
   Quaterniond moved;
   Matrix vector;

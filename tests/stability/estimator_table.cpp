@@ -14,23 +14,23 @@ namespace {
 
 using namespace qdmd;
 
-constexpr size_t kPixels = 64 * 48;
+constexpr size_t kPixels = 80 * 60;
+constexpr int kDarkest = 20, kBrightest = 100;
 
 struct Mean {
   double sum = 0, squares = 0;
   int count = 0;
   void add(double x) { sum += x, squares += x * x, ++count; }
   double mean() const { return sum / count; }
-  // Its standard error.
-  double error() const {
-    const double spread = std::max(0.0, squares / count - mean() * mean());
-    return std::sqrt(spread / std::max(1, count - 1));
+  // Of one of them.
+  double deviation() const {
+    return std::sqrt(std::max(0.0, squares / count - mean() * mean()) * count / (count - 1));
   }
 };
 
 test::Clip fading(double factor, double sigma, size_t count, unsigned seed) {
   std::mt19937 rng(seed);
-  const auto picture = test::random_picture(kPixels, rng, 30, 200);
+  const auto picture = test::random_picture(kPixels, rng, kDarkest, kBrightest);
   std::normal_distribution<float> noise(0, static_cast<float>(sigma));
   test::Clip clip(kPixels, count);
   double light = 1;
@@ -39,6 +39,20 @@ test::Clip fading(double factor, double sigma, size_t count, unsigned seed) {
       for (size_t p = 0; p < kPixels; ++p)
         clip.set(t, c, p, light * picture[c * kPixels + p] + static_cast<double>(noise(rng)));
   return clip;
+}
+
+// What such frames' Gram matrix is on average over all noise: what noise adds to the products of
+// different frames averages out.
+QuaternionMatrixd expected_gram(double factor, double sigma, size_t count) {
+  const double n = 3.0 * kPixels, spread = kBrightest - kDarkest;
+  const double square =
+      n * (std::pow((kDarkest + kBrightest) / 2.0, 2) + spread * (spread + 2) / 12.0);
+  QuaternionMatrixd gram(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(count));
+  for (Eigen::Index c = 0; c < gram.cols(); ++c)
+    for (Eigen::Index r = 0; r < gram.rows(); ++r)
+      gram.a(r, c) = square * std::pow(factor, static_cast<double>(r + c)) +
+                     (r == c ? n * sigma * sigma : 0.0);
+  return gram;
 }
 
 struct Way {
@@ -63,28 +77,35 @@ int main(int argc, char** argv) {
   for (double factor : {1.0, 0.999})
     for (double sigma : {1.0, 3.0, 10.0})
       for (size_t frames : {size_t{50}, size_t{200}}) {
-        Mean bias[std::size(kWays)], light[std::size(kWays)];
+        // Of |lambda|, and of L's light from the first frame to the last, in percent.
+        const double last = static_cast<double>(frames - 1);
+        const auto errors = [&](const Way& way, const SnapshotFactor<double>& snapshots) {
+          DmdOptions options;
+          options.estimator = way.estimator;
+          options.rank = way.rank;
+          const auto modes = solve_factor(snapshots, options);
+          const double ratio = (snapshots.r * shares_at(modes, last)).norm() /
+                               (snapshots.r * shares_at(modes, 0)).norm();
+          return std::pair{1e6 * (std::abs(modes.eigenvalues(0)) - factor),
+                           100 * (ratio / std::pow(factor, last) - 1)};
+        };
+        Mean lambda[std::size(kWays)], light[std::size(kWays)];
         for (int seed = 0; seed < seeds; ++seed) {
-          const auto gram = test::quaternion_gram_of(
-              fading(factor, sigma, frames, static_cast<unsigned>(1000 * seed) + 7));
-          const auto factors = factorize_gram(gram);
-          const double last = static_cast<double>(frames - 1);
+          const auto snapshots = factorize_gram(test::quaternion_gram_of(
+              fading(factor, sigma, frames, static_cast<unsigned>(1000 * seed) + 7)));
           for (size_t k = 0; k < std::size(kWays); ++k) {
-            DmdOptions options;
-            options.estimator = kWays[k].estimator;
-            options.rank = kWays[k].rank;
-            const auto modes = solve_factor(factors, options);
-            bias[k].add(std::abs(modes.eigenvalues(0)) - factor);
-            // How much darker L gets from the first frame to the last than the truth does.
-            const double ratio = (factors.r * shares_at(modes, last)).norm() /
-                                 (factors.r * shares_at(modes, 0)).norm();
-            light[k].add(100 * (ratio / std::pow(factor, last) - 1));
+            const auto [of_lambda, of_light] = errors(kWays[k], snapshots);
+            lambda[k].add(of_lambda);
+            light[k].add(of_light);
           }
         }
+        const auto average = factorize_gram(expected_gram(factor, sigma, frames));
         std::printf("| %g | %zu | %g |", sigma, frames, factor);
-        for (size_t k = 0; k < std::size(kWays); ++k)
-          std::printf(" %.2g ± %.1g; %.2g ± %.1g |", 1e6 * bias[k].mean(), 1e6 * bias[k].error(),
-                      light[k].mean(), light[k].error());
+        for (size_t k = 0; k < std::size(kWays); ++k) {
+          const auto [of_lambda, of_light] = errors(kWays[k], average);
+          std::printf(" %.2g ± %.1g; %.2g ± %.1g |", of_lambda, lambda[k].deviation(), of_light,
+                      light[k].deviation());
+        }
         std::printf("\n");
         std::fflush(stdout);
       }
