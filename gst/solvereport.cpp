@@ -49,16 +49,15 @@ GValue value_of(std::complex<double> number) {
 // Arrays of equal length, where there is a spectrum.
 void add_spectrum(const DmdSummary& dmd, GstStructure* structure) {
   if (!dmd.spectrum) return;
-  GValue eigenvalues = array_of(dmd.spectrum->size()), amplitudes = array_of(dmd.spectrum->size()),
-         background = array_of(dmd.spectrum->size());
-  for (const SpectrumMode& mode : *dmd.spectrum) {
-    append(&eigenvalues, value_of(mode.lambda));
-    append(&amplitudes, value_of(mode.amplitude));
-    append(&background, value_of(mode.background));
-  }
-  gst_structure_take_value(structure, "eigenvalues", &eigenvalues);
-  gst_structure_take_value(structure, "amplitudes", &amplitudes);
-  gst_structure_take_value(structure, "background", &background);
+  const auto add = [&](const char* name, auto number_of) {
+    GValue array = array_of(dmd.spectrum->size());
+    for (const SpectrumMode& mode : *dmd.spectrum) append(&array, value_of(number_of(mode)));
+    gst_structure_take_value(structure, name, &array);
+  };
+  add("eigenvalues-real", [](const SpectrumMode& mode) { return mode.lambda.real(); });
+  add("eigenvalues-imaginary", [](const SpectrumMode& mode) { return mode.lambda.imag(); });
+  add("amplitudes", [](const SpectrumMode& mode) { return mode.amplitude; });
+  add("background", [](const SpectrumMode& mode) { return mode.background; });
 }
 
 }  // namespace
