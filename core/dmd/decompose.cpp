@@ -92,7 +92,6 @@ double most_matrices(const DmdOptions& options) {
   // R, the pencil H and R11 twice, H - R11 twice.
   // Derivatives tell how sure the paper's estimate is, without matrices that are moved.
   const bool told = options.estimator == Estimator::exact;
-  if (told && options.solver == Solver::qr) return 8.65;
   return told && options.solver != Solver::gram_extended ? 8 : 7 + kSure;
 }
 
@@ -109,10 +108,11 @@ uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snaps
     case Solver::gram_extended:
       break;
     case Solver::qr: {
-      // A block of rows below R, as many reflectors less their triangle, and R of the block.
+      // A block of rows below R, as many reflectors less their triangle, R of the block, and the
+      // Gram matrix, by which the bound goes.
       const double rows = std::max(512.0, 2 * m) + m;
       return static_cast<uint64_t>(
-          std::max(2 * sizeof(Quaterniond) * rows * m + 1.5 * matrix, reduced));
+          std::max(2 * sizeof(Quaterniond) * rows * m + 2.15 * matrix, reduced));
     }
     case Solver::adjoint:
       return static_cast<uint64_t>(adjoint_bytes(pixels, m));
