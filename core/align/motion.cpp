@@ -1,0 +1,176 @@
+#include "core/align/motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace qdmd {
+namespace {
+
+constexpr int kLandmarks = 1024, kLandmarksAbove = 512;
+// Pixels along the short side of the pyramid's top, at least.
+constexpr int kTop = 20;
+// Pixels below which the camera is at rest.
+constexpr double kRest = 0.1;
+// Standard deviations by which a shift must be known.
+constexpr double kSure = 4;
+// Of what is searched in each direction: the share of the picture's longer side.
+constexpr double kReach = 1.0 / 8;
+// Less agreement than this is none.
+constexpr double kLeastAgree = 0.25;
+// At rest so many fit in one look; fewer, and somebody stands before more than half of them.
+constexpr double kRestAgree = 0.45;
+// Levels: frames that differ by more from the first reference may have been moved.
+constexpr double kFirstNoise = 4;
+
+Pose at_level(const Pose& pose, size_t level) {
+  const double share = std::ldexp(1.0, -static_cast<int>(level));
+  return {pose.x * share, pose.y * share, pose.angle, pose.scale};
+}
+
+void halve(const uint8_t* from, int from_width, int width, int height, uint8_t* to) {
+  for (int y = 0; y < height; ++y) {
+    const uint8_t* const a = from + ptrdiff_t{2} * y * from_width;
+    const uint8_t* const b = a + from_width;
+    uint8_t* const out = to + ptrdiff_t{y} * width;
+    for (int x = 0; x < width; ++x)
+      out[x] = static_cast<uint8_t>((a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1] + 2) / 4);
+  }
+}
+
+}  // namespace
+
+MotionFinder::MotionFinder(int width, int height) {
+  for (int k = 0; k == 0 || std::min(width, height) >= kTop; ++k, width /= 2, height /= 2) {
+    const size_t samples = k == 0 ? 0 : static_cast<size_t>(width) * static_cast<size_t>(height);
+    levels_.push_back({width, height, std::vector<uint8_t>(samples),
+                       Landmarks(k == 0 ? kLandmarks : kLandmarksAbove)});
+  }
+}
+
+uint64_t MotionFinder::bytes(int width, int height) {
+  uint64_t bytes = Landmarks::bytes(kLandmarks);
+  for (width /= 2, height /= 2; std::min(width, height) >= kTop; width /= 2, height /= 2)
+    bytes += static_cast<uint64_t>(width) * static_cast<uint64_t>(height) +
+             Landmarks::bytes(kLandmarksAbove);
+  return bytes;
+}
+
+void MotionFinder::forget() {
+  known_ = false;
+  light_ = {};
+  noise_ = 0;
+}
+
+void MotionFinder::build(const uint8_t* grey) {
+  for (size_t k = 1; k < levels_.size(); ++k)
+    halve(k == 1 ? grey : levels_[k - 1].picture.data(), levels_[k - 1].width, levels_[k].width,
+          levels_[k].height, levels_[k].picture.data());
+}
+
+GreyView MotionFinder::view(size_t level, const uint8_t* grey) const {
+  const Level& at = levels_[level];
+  return {level == 0 ? grey : at.picture.data(), at.width, at.height};
+}
+
+void MotionFinder::take_reference(const uint8_t* grey, const IgnoredAreas& ignored) {
+  build(grey);
+  for (size_t k = 0; k < levels_.size(); ++k)
+    levels_[k].marks.choose(view(k, grey), ignored, 1 << k);
+  light_ = {};
+  known_ = true;
+}
+
+// The whole shift of the pyramid's top at which most landmarks fit. In doubt, the one before.
+Pose MotionFinder::search(const uint8_t* grey, const Pose& before) const {
+  const size_t top = levels_.size() - 1;
+  const Level& at = levels_[top];
+  // Half a pixel beside, edges are some levels off.
+  const double limit = std::max(8.0, 2 * noise_);
+  const Pose start = at_level(before, top);
+  const auto x = static_cast<int>(std::lround(start.x)), y = static_cast<int>(std::lround(start.y));
+  const GreyView frame = view(top, grey);
+  constexpr double kDoubt = 0.03;
+  double best = at.marks.share_within(frame, x, y, light_, limit) + kDoubt;
+  Pose found = before;
+  const int reach = static_cast<int>(std::ceil(kReach * std::max(at.width, at.height)));
+  for (int dy = -reach; dy <= reach; ++dy)
+    for (int dx = -reach; dx <= reach; ++dx) {
+      const double share = at.marks.share_within(frame, dx, dy, light_, limit);
+      if (share <= best) continue;
+      best = share;
+      found = before;
+      found.x = std::ldexp(dx, static_cast<int>(top));
+      found.y = std::ldexp(dy, static_cast<int>(top));
+    }
+  return found;
+}
+
+// Steps until one is shorter than `enough` pixels of the level.
+Fit MotionFinder::refine(size_t level, const uint8_t* grey, Pose pose, bool turns, int steps,
+                         double enough) {
+  Level& at = levels_[level];
+  const GreyView frame = view(level, grey);
+  Fit fit;
+  fit.pose = at_level(pose, level);
+  fit.light = light_;
+  for (int i = 0; i < steps; ++i) {
+    const Fit next = at.marks.step(frame, fit.pose, fit.light, turns);
+    if (!next.known) break;
+    const double way = largest_way(next.pose, fit.pose, at.width, at.height);
+    fit = next;
+    if (way < enough) break;
+  }
+  const double factor = std::ldexp(1.0, static_cast<int>(level));
+  fit.pose.x *= factor;
+  fit.pose.y *= factor;
+  fit.error *= factor;
+  return fit;
+}
+
+Motion MotionFinder::find(const uint8_t* grey, const Pose& before, bool turns) {
+  Motion motion;
+  if (!known_) return motion;
+  const Level& full = levels_[0];
+  const auto way = [&](const Pose& pose) {
+    return largest_way(pose, Pose(), full.width, full.height);
+  };
+  const auto at_rest = [&](const Fit& fit) {
+    return way(fit.pose) < std::max(kRest, kSure * fit.error);
+  };
+  const auto settle = [&](const Fit& fit, const Pose& pose) {
+    motion.pose = pose;
+    motion.agree = fit.agree;
+    motion.found = true;
+    light_ = fit.light;
+    noise_ = noise_ > 0 ? noise_ + 0.1 * (fit.noise - noise_) : fit.noise;
+    return motion;
+  };
+  Landmarks& marks = levels_[0].marks;
+  const Fit look = marks.step(view(0, grey), Pose(), light_, turns);
+  // A picture without edges shows no motion.
+  if (!look.known) {
+    motion.found = true;
+    return motion;
+  }
+  const bool quiet = noise_ == 0 ? look.noise < kFirstNoise : look.noise < 1 + 1.5 * noise_;
+  if (quiet && look.agree >= kRestAgree && at_rest(look)) return settle(look, Pose());
+
+  build(grey);
+  Fit fit;
+  fit.pose = search(grey, before);
+  for (size_t k = levels_.size(); k-- > 0;) {
+    const Fit next = refine(k, grey, fit.pose, turns, k == 0 ? 8 : 4, k == 0 ? 0.005 : 0.02);
+    if (next.known) fit = next;
+  }
+  if (!fit.known) return motion;
+  // What fits must do so within the noise of frames that fitted, and better than rest.
+  const double noise = noise_ > 0 ? std::min(fit.noise, 1.5 * noise_) : fit.noise;
+  const Fit there = marks.step(view(0, grey), fit.pose, fit.light, turns, noise);
+  const Fit here = marks.step(view(0, grey), Pose(), look.light, turns, noise);
+  if (std::max(there.agree, here.agree) < kLeastAgree) return motion;
+  if (here.agree >= there.agree || at_rest(fit)) return settle(here, Pose());
+  fit.agree = there.agree;
+  return settle(fit, fit.pose);
+}
+
+}  // namespace qdmd
