@@ -1,0 +1,73 @@
+// Follows a camera that shakes: the pose of each frame of a stream.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/align/motion.h"
+#include "core/align/resampler.h"
+#include "core/base/channels.h"
+#include "core/model/learnt.h"
+
+namespace qdmd {
+
+// How the camera may move.
+enum class Stabilize {
+  off,          // it stands still, whatever frames show
+  translation,  // it looks beside its place
+  similarity    // and is turned, and sees more or less
+};
+
+// Frames are compared with the first one, then with the mean of the first few, and then with the
+// background that was learnt. Poses are relative to the first one's, which is the canvas. A camera
+// that looks further beside its place than an eighth of the picture shows another view: the canvas
+// is then the newest frame.
+class Stabilizer {
+ public:
+  // Takes all memory. For frames of width x height pixels.
+  Stabilizer(Stabilize how, Colours colours, int width, int height);
+  static uint64_t bytes(int width, int height);
+
+  // The next frame is of another stream.
+  void forget();
+  // The next frame begins a new scene, and is its canvas.
+  void begin_scene() { anew_ = true; }
+  // The channel that frames are compared by.
+  int channel() const { return channel_; }
+
+  // The pose of the next frame, whose channel is `grey`. Where too little is seen of the scene,
+  // that of the frame before.
+  Pose follow(const uint8_t* grey, const IgnoredAreas& ignored);
+  // The same frame on the canvas.
+  void saw(const uint8_t* grey, const IgnoredAreas& ignored);
+  // The background picture that frames are compared with from now on.
+  void refer_to(const uint8_t* grey, const IgnoredAreas& ignored);
+  // Frames since that.
+  int64_t frames_since_reference() const { return since_reference_; }
+
+  // Of the newest frame.
+  const Pose& pose() const { return pose_; }
+  // Frames in a row that showed too little of the scene, the newest included.
+  int lost() const { return lost_; }
+  // How often the camera went on to another view.
+  uint64_t views() const { return views_; }
+  Resampler& resampler() { return resampler_; }
+
+ private:
+  void begin(const uint8_t* grey, const IgnoredAreas& ignored);
+
+  bool turns_;
+  int channel_, width_, height_;
+  MotionFinder finder_;
+  Resampler resampler_;
+  std::vector<uint16_t> sum_;  // of the first frames
+  std::vector<uint8_t> mean_;
+  int summed_ = 0;
+  bool anew_ = true;
+  Pose pose_;
+  int lost_ = 0, beyond_ = 0;
+  int64_t since_reference_ = 0;
+  uint64_t views_ = 0;
+};
+
+}  // namespace qdmd

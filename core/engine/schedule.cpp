@@ -1,0 +1,31 @@
+#include "core/engine/schedule.h"
+
+namespace qdmd {
+namespace {
+
+// Frames between backgrounds that frames are compared with: they hardly change.
+constexpr int64_t kReferenceFrames = 50;
+
+}  // namespace
+
+bool Schedule::take(const ImageView& frame) {
+  if (!frames().append(frame)) return false;
+  Stabilizer* const stabilizer = stage_.stabilizer;
+  if (!stabilizer || no_room_) return true;
+  const IgnoredAreas& ignored = background().wishes().ignored;
+  if (background().known() && background().solves() != referred_to_ &&
+      (referred_to_ == 0 || stabilizer->frames_since_reference() >= kReferenceFrames)) {
+    referred_to_ = background().solves();
+    show_newest();
+    stage_.restorer->write_canvas(background().model(), frames().window().pixels());
+    stabilizer->refer_to(stage_.restorer->canvas(stabilizer->channel()), ignored);
+  }
+  const PlaneSlots& planes = frames().window();
+  const int slot = frames().window().newest_slot(), channel = stabilizer->channel();
+  const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
+  if (!pose.is_rest()) no_room_ = !frames().steady(pose, &stabilizer->resampler(), idle_pool());
+  stabilizer->saw(planes.plane(slot, channel), ignored);
+  return true;
+}
+
+}  // namespace qdmd

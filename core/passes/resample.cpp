@@ -1,0 +1,231 @@
+#include "core/passes/resample.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/passes/resample.cpp"
+#include "core/passes/simd.h"
+
+#ifndef QDMD_RESAMPLE_CONSTANTS
+#define QDMD_RESAMPLE_CONSTANTS
+namespace qdmd {
+
+// A tile of the output: the rows that it is made of are computed once for all of its own.
+constexpr int kTileWidth = 256, kTileHeight = 32;
+// Samples to both sides of a tile's row that may be read: taps, whole vectors, and turns.
+constexpr int kSlack = 96;
+// Rows that a tile is made of, at most: taps and turns.
+constexpr int kTileRows = kTileHeight + 8 + 2 * 16;
+
+}  // namespace qdmd
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace qdmd {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::CappedTag<float, 16>;
+using Vector = hn::Vec<Floats>;
+
+// Catmull and Rom's weight of a sample `way` pixels off.
+HWY_INLINE Vector weight_of(Vector way) {
+  const Floats d;
+  const auto t = hn::Abs(way);
+  const auto near =
+      hn::Add(hn::Mul(hn::Mul(hn::Sub(hn::Mul(hn::Set(d, 1.5f), t), hn::Set(d, 2.5f)), t), t),
+              hn::Set(d, 1.0f));
+  const auto far =
+      hn::Add(hn::Mul(hn::Sub(hn::Mul(hn::Add(hn::Mul(hn::Set(d, -0.5f), t), hn::Set(d, 2.5f)), t),
+                              hn::Set(d, 4.0f)),
+                      t),
+              hn::Set(d, 2.0f));
+  return hn::IfThenElse(hn::Lt(t, hn::Set(d, 1.0f)), near,
+                        hn::IfThenElseZero(hn::Lt(t, hn::Set(d, 2.0f)), far));
+}
+
+HWY_INLINE Vector load_levels(const uint8_t* from) {
+  const Floats d;
+  const hn::Rebind<int32_t, Floats> d32;
+  const hn::Rebind<uint8_t, Floats> d8;
+  return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
+}
+
+// to[i] is at place + i * step of a row whose samples begin at `row`: place is counted from there.
+// Whole vectors; neighbours in one are less than two samples further apart than they.
+void along_row(const uint8_t* row, float place, float step, int count, float* to) {
+  const Floats d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  if (step == 1) {
+    const float whole = std::floor(place);
+    float w[4];
+    for (int k = 0; k < 4; ++k) {
+      const auto one = weight_of(hn::Set(d, place - whole + 1 - static_cast<float>(k)));
+      w[k] = hn::GetLane(one);
+    }
+    const auto w0 = hn::Set(d, w[0]), w1 = hn::Set(d, w[1]), w2 = hn::Set(d, w[2]),
+               w3 = hn::Set(d, w[3]);
+    const uint8_t* from = row + static_cast<int>(whole) - 1;
+    for (int i = 0; i < count; i += lanes, from += lanes) {
+      const auto sum =
+          hn::Add(hn::Add(hn::Mul(w0, load_levels(from)), hn::Mul(w1, load_levels(from + 1))),
+                  hn::Add(hn::Mul(w2, load_levels(from + 2)), hn::Mul(w3, load_levels(from + 3))));
+      hn::StoreU(sum, d, to + i);
+    }
+    return;
+  }
+  const auto ahead = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
+  const float last = step * static_cast<float>(lanes - 1);
+  for (int i = 0; i < count; i += lanes) {
+    const float at = place + static_cast<float>(i) * step;
+    // Lanes are read from samples that are side by side: where places are further apart or nearer
+    // than these, the way to them grows.
+    const float whole = std::floor(std::min(at, at + last - static_cast<float>(lanes - 1)));
+    const uint8_t* const from = row + static_cast<int>(whole) - 1;
+    const auto way = hn::Sub(hn::Add(hn::Set(d, at - whole + 1), ahead), hn::Iota(d, 0));
+    auto sum = hn::Zero(d);
+    for (int k = 0; k < 5; ++k)
+      sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
+                                 load_levels(from + k)));
+    hn::StoreU(sum, d, to + i);
+  }
+}
+
+HWY_INLINE void store_levels(Vector sum, uint8_t* to) {
+  const Floats d;
+  const hn::Rebind<int32_t, Floats> d32;
+  const hn::Rebind<uint8_t, Floats> d8;
+  const auto level = hn::Min(hn::Max(sum, hn::Zero(d)), hn::Set(d, 255.0f));
+  const auto whole = hn::ConvertTo(d32, hn::Add(level, hn::Set(d, 0.5f)));
+  hn::StoreU(hn::DemoteTo(d8, whole), d8, to);
+}
+
+// to[i] is at place + i * step of column i, whose samples are `stride` apart; place is counted from
+// the first row. Whole vectors.
+void along_columns(const float* columns, size_t stride, float place, float step, int count,
+                   uint8_t* to) {
+  const Floats d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  const auto way_of = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
+  const float last = step * static_cast<float>(lanes - 1);
+  const int taps = step == 0 ? 4 : 5;
+  for (int i = 0; i < count; i += lanes) {
+    const float at = place + static_cast<float>(i) * step;
+    const float whole = std::floor(std::min(at, at + last));
+    const float* from =
+        columns + (static_cast<ptrdiff_t>(whole) - 1) * static_cast<ptrdiff_t>(stride) + i;
+    const auto way = hn::Add(hn::Set(d, at - whole + 1), way_of);
+    auto sum = hn::Zero(d);
+    for (int k = 0; k < taps; ++k, from += stride)
+      sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
+                                 hn::LoadU(d, from)));
+    store_levels(sum, to + i);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace qdmd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace qdmd {
+namespace {
+
+HWY_EXPORT(along_row);
+HWY_EXPORT(along_columns);
+
+// Of a row's numbers 0 .. count - 1, those for which low <= start + i * step <= high, are one run.
+struct Run {
+  int begin, end;
+};
+Run run_within(float start, float step, float low, float high, int count) {
+  // The ends are looked for: sums of floats are what they are.
+  const auto inside = [&](int i) {
+    const float at = start + static_cast<float>(i) * step;
+    return at >= low && at <= high;
+  };
+  if (step == 0) return inside(0) ? Run{0, count} : Run{0, 0};
+  const float first = (step > 0 ? low - start : high - start) / step;
+  const float last = (step > 0 ? high - start : low - start) / step;
+  const auto most = static_cast<float>(count);
+  int begin = static_cast<int>(std::clamp(std::ceil(first) - 1, 0.0f, most));
+  int end = static_cast<int>(std::clamp(std::floor(last) + 2, 0.0f, most));
+  while (begin < end && !inside(begin)) ++begin;
+  while (end > begin && !inside(end - 1)) --end;
+  return {begin, end};
+}
+
+}  // namespace
+
+ResampleRoom::ResampleRoom()
+    : columns_(static_cast<size_t>(kTileRows) * (kTileWidth + 16)), row_(kTileWidth + 2 * kSlack) {}
+
+void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room) {
+  const Places& at = task.places;
+  constexpr size_t kStride = kTileWidth + 16;
+  float* const columns = room->columns_.data();
+  uint8_t* const padded = room->row_.data();
+  alignas(64) uint8_t made[kTileWidth + 16];
+  const auto right = static_cast<float>(task.from_width - 1),
+             low = static_cast<float>(task.from_height - 1);
+  // Along a row of the picture, output columns are so many of its samples apart.
+  const float step = at.xx - at.xy * at.yx / at.yy;
+  for (int top = first_row; top < first_row + row_count; top += kTileHeight) {
+    const int rows = std::min(kTileHeight, first_row + row_count - top);
+    for (int left = 0; left < task.width; left += kTileWidth) {
+      const int cols = std::min(kTileWidth, task.width - left);
+      const auto y_of = [&](int x, int y) {
+        return at.y0 + at.yx * static_cast<float>(x) + at.yy * static_cast<float>(y);
+      };
+      const float corners[4] = {y_of(left, top), y_of(left + cols - 1, top),
+                                y_of(left, top + rows - 1), y_of(left + cols - 1, top + rows - 1)};
+      const float highest = *std::min_element(corners, corners + 4);
+      const float lowest = *std::max_element(corners, corners + 4);
+      if (lowest < 0 || highest > low) continue;
+      // Rows of the picture that the tile is made of, some of them outside of it.
+      const int first = static_cast<int>(std::floor(std::max(highest, -1.0f))) - 2;
+      const int end = static_cast<int>(std::floor(std::min(lowest, low + 1))) + 5;
+      for (int v = first; v < std::min(end, first + kTileRows); ++v) {
+        const auto row = static_cast<float>(v);
+        // Where the tile's first column is in that row.
+        const float y = (row - at.y0 - at.yx * static_cast<float>(left)) / at.yy;
+        const float x = at.x0 + at.xx * static_cast<float>(left) + at.xy * y;
+        const int from = static_cast<int>(std::floor(x)) - kSlack / 2;
+        const uint8_t* const source =
+            task.from +
+            static_cast<ptrdiff_t>(std::clamp(v, 0, task.from_height - 1)) * task.from_width;
+        const int length = kTileWidth + 2 * kSlack;
+        const int inside = std::clamp(-from, 0, length),
+                  behind = std::clamp(task.from_width - from, inside, length);
+        std::memset(padded, source[0], static_cast<size_t>(inside));
+        std::memcpy(padded + inside, source + from + inside, static_cast<size_t>(behind - inside));
+        std::memset(padded + behind, source[task.from_width - 1],
+                    static_cast<size_t>(length - behind));
+        HWY_DYNAMIC_DISPATCH(along_row)
+        (padded, x - static_cast<float>(from), step, cols,
+         columns + static_cast<size_t>(v - first) * kStride);
+      }
+      for (int y = top; y < top + rows; ++y) {
+        const float x_start =
+            at.x0 + at.xx * static_cast<float>(left) + at.xy * static_cast<float>(y);
+        const float y_start = y_of(left, y);
+        const Run across = run_within(x_start, at.xx, 0, right, cols);
+        const Run down = run_within(y_start, at.yx, 0, low, cols);
+        const int begin = std::max(across.begin, down.begin), stop = std::min(across.end, down.end);
+        if (begin >= stop) continue;
+        HWY_DYNAMIC_DISPATCH(along_columns)
+        (columns + begin, kStride,
+         y_start + at.yx * static_cast<float>(begin) - static_cast<float>(first), at.yx,
+         stop - begin, made);
+        std::memcpy(task.to + static_cast<ptrdiff_t>(y) * task.width + left + begin, made,
+                    static_cast<size_t>(stop - begin));
+      }
+    }
+  }
+}
+
+}  // namespace qdmd
+#endif
