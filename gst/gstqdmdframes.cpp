@@ -251,6 +251,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
       engine.set_shadows(settings.shadows);
       engine.set_mask_softness(settings.engine.mask_softness);
+      engine.set_stabilize_output(settings.stabilize_output);
       engine.set_ignored(ignored_of(settings, shell.get()));
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       engine.pop(settings.output, frame.view<uint8_t>());
