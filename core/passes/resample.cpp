@@ -16,8 +16,10 @@ namespace qdmd {
 constexpr int kTileWidth = 256, kTileHeight = 32;
 // Samples to both sides of a tile's row that may be read: taps, whole vectors, and turns.
 constexpr int kSlack = 96;
+// Samples that an output sample is made of, in each direction, and how many of them are before it.
+constexpr int kTaps = 6, kBefore = 2;
 // Rows that a tile is made of, at most: taps and turns.
-constexpr int kTileRows = kTileHeight + 8 + 2 * 16;
+constexpr int kTileRows = kTileHeight + 10 + 2 * 16;
 
 }  // namespace qdmd
 #endif
@@ -31,20 +33,24 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Floats>;
 
-// Catmull and Rom's weight of a sample `way` pixels off.
+// c0 + t (c1 + t (c2 + t c3)).
+HWY_INLINE Vector cubic(Vector t, float c3, float c2, float c1, float c0) {
+  const Floats d;
+  auto sum = hn::Add(hn::Mul(hn::Set(d, c3), t), hn::Set(d, c2));
+  sum = hn::Add(hn::Mul(sum, t), hn::Set(d, c1));
+  return hn::Add(hn::Mul(sum, t), hn::Set(d, c0));
+}
+
+// The weight of a sample `way` pixels off.
 HWY_INLINE Vector weight_of(Vector way) {
   const Floats d;
   const auto t = hn::Abs(way);
-  const auto near =
-      hn::Add(hn::Mul(hn::Mul(hn::Sub(hn::Mul(hn::Set(d, 1.5f), t), hn::Set(d, 2.5f)), t), t),
-              hn::Set(d, 1.0f));
-  const auto far =
-      hn::Add(hn::Mul(hn::Sub(hn::Mul(hn::Add(hn::Mul(hn::Set(d, -0.5f), t), hn::Set(d, 2.5f)), t),
-                              hn::Set(d, 4.0f)),
-                      t),
-              hn::Set(d, 2.0f));
-  return hn::IfThenElse(hn::Lt(t, hn::Set(d, 1.0f)), near,
-                        hn::IfThenElseZero(hn::Lt(t, hn::Set(d, 2.0f)), far));
+  const auto near = cubic(t, 4.0f / 3, -7.0f / 3, 0, 1);
+  const auto far = cubic(t, -7.0f / 12, 3, -59.0f / 12, 2.5f);
+  const auto farthest = cubic(t, 1.0f / 12, -2.0f / 3, 21.0f / 12, -1.5f);
+  const auto beyond = hn::IfThenElse(hn::Lt(t, hn::Set(d, 2.0f)), far,
+                                     hn::IfThenElseZero(hn::Lt(t, hn::Set(d, 3.0f)), farthest));
+  return hn::IfThenElse(hn::Lt(t, hn::Set(d, 1.0f)), near, beyond);
 }
 
 HWY_INLINE Vector load_levels(const uint8_t* from) {
@@ -61,18 +67,13 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
   const auto lanes = static_cast<int>(hn::Lanes(d));
   if (step == 1) {
     const float whole = std::floor(place);
-    float w[4];
-    for (int k = 0; k < 4; ++k) {
-      const auto one = weight_of(hn::Set(d, place - whole + 1 - static_cast<float>(k)));
-      w[k] = hn::GetLane(one);
-    }
-    const auto w0 = hn::Set(d, w[0]), w1 = hn::Set(d, w[1]), w2 = hn::Set(d, w[2]),
-               w3 = hn::Set(d, w[3]);
-    const uint8_t* from = row + static_cast<int>(whole) - 1;
+    Vector weight[kTaps];
+    for (int k = 0; k < kTaps; ++k)
+      weight[k] = weight_of(hn::Set(d, place - whole + kBefore - static_cast<float>(k)));
+    const uint8_t* from = row + static_cast<int>(whole) - kBefore;
     for (int i = 0; i < count; i += lanes, from += lanes) {
-      const auto sum =
-          hn::Add(hn::Add(hn::Mul(w0, load_levels(from)), hn::Mul(w1, load_levels(from + 1))),
-                  hn::Add(hn::Mul(w2, load_levels(from + 2)), hn::Mul(w3, load_levels(from + 3))));
+      auto sum = hn::Mul(weight[0], load_levels(from));
+      for (int k = 1; k < kTaps; ++k) sum = hn::Add(sum, hn::Mul(weight[k], load_levels(from + k)));
       hn::StoreU(sum, d, to + i);
     }
     return;
@@ -84,10 +85,10 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
     // Lanes are read from samples that are side by side: where places are further apart or nearer
     // than these, the way to them grows.
     const float whole = std::floor(std::min(at, at + last - static_cast<float>(lanes - 1)));
-    const uint8_t* const from = row + static_cast<int>(whole) - 1;
-    const auto way = hn::Sub(hn::Add(hn::Set(d, at - whole + 1), ahead), hn::Iota(d, 0));
+    const uint8_t* const from = row + static_cast<int>(whole) - kBefore;
+    const auto way = hn::Sub(hn::Add(hn::Set(d, at - whole + kBefore), ahead), hn::Iota(d, 0));
     auto sum = hn::Zero(d);
-    for (int k = 0; k < 5; ++k)
+    for (int k = 0; k <= kTaps; ++k)
       sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
                                  load_levels(from + k)));
     hn::StoreU(sum, d, to + i);
@@ -111,13 +112,13 @@ void along_columns(const float* columns, size_t stride, float place, float step,
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto way_of = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
   const float last = step * static_cast<float>(lanes - 1);
-  const int taps = step == 0 ? 4 : 5;
+  const int taps = step == 0 ? kTaps : kTaps + 1;
   for (int i = 0; i < count; i += lanes) {
     const float at = place + static_cast<float>(i) * step;
     const float whole = std::floor(std::min(at, at + last));
     const float* from =
-        columns + (static_cast<ptrdiff_t>(whole) - 1) * static_cast<ptrdiff_t>(stride) + i;
-    const auto way = hn::Add(hn::Set(d, at - whole + 1), way_of);
+        columns + (static_cast<ptrdiff_t>(whole) - kBefore) * static_cast<ptrdiff_t>(stride) + i;
+    const auto way = hn::Add(hn::Set(d, at - whole + kBefore), way_of);
     auto sum = hn::Zero(d);
     for (int k = 0; k < taps; ++k, from += stride)
       sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
@@ -186,8 +187,8 @@ void resample(const Resampling& task, int first_row, int row_count, ResampleRoom
       const float lowest = *std::max_element(corners, corners + 4);
       if (lowest < 0 || highest > low) continue;
       // Rows of the picture that the tile is made of, some of them outside of it.
-      const int first = static_cast<int>(std::floor(std::max(highest, -1.0f))) - 2;
-      const int end = static_cast<int>(std::floor(std::min(lowest, low + 1))) + 5;
+      const int first = static_cast<int>(std::floor(std::max(highest, -1.0f))) - kBefore - 1;
+      const int end = static_cast<int>(std::floor(std::min(lowest, low + 1))) + kTaps - kBefore + 3;
       for (int v = first; v < std::min(end, first + kTileRows); ++v) {
         const auto row = static_cast<float>(v);
         // Where the tile's first column is in that row.

@@ -36,10 +36,10 @@ struct Resampling {
   int width = 0, height = 0;
 };
 
-// Rows first_row .. first_row + row_count - 1 of `to`, by cubic convolution (Keys 1981, Catmull and
-// Rom's weights), first along rows and then along columns, rounded to whole levels. Output pixels
-// that are outside of the picture stay as they are; next to its border it goes on as it ends. Any
-// threads may write different rows.
+// Rows first_row .. first_row + row_count - 1 of `to`, by cubic convolution (the six
+// points of Keys 1981), first along rows and then along columns, rounded to whole levels. Output
+// pixels that are outside of the picture stay as they are; next to its border it goes on as it
+// ends. Any threads may write different rows.
 void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room);
 
 }  // namespace qdmd
