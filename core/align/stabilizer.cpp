@@ -8,6 +8,9 @@ namespace {
 
 // First frames whose mean is the reference until there is a background.
 constexpr int kFirstFrames = 16;
+
+// A frame for which the canvas is moved is sharper by so much.
+constexpr double kSharper = 1.03;
 // Of the picture's longer side: further beside is another view.
 constexpr double kFarthest = 1.0 / 8;
 // Frames in a row that are beyond that, and that show nothing that is known.
@@ -40,25 +43,44 @@ void Stabilizer::forget() {
 void Stabilizer::begin(const uint8_t* grey, const IgnoredAreas& ignored) {
   finder_.forget();
   finder_.take_reference(grey, ignored);
-  std::fill(sum_.begin(), sum_.end(), uint16_t{0});
   summed_ = lost_ = beyond_ = 0;
+  candidates_ = turns_ ? 0 : kFirstFrames;
+  sharpest_ = candidates_ > 0 ? kSharper * sharpness(grey) : 0;
+  sharpest_pose_ = offset_ = canvas_moved_ = {};
   since_reference_ = 0;
   pose_ = {};
   anew_ = false;
 }
 
+// The power of the differences of neighbours.
+double Stabilizer::sharpness(const uint8_t* grey) const {
+  int64_t sum = 0;
+  for (int y = 0; y + 1 < height_; y += 2) {
+    const uint8_t* const row = grey + ptrdiff_t{y} * width_;
+    int of_row = 0;
+    for (int x = 0; x + 1 < width_; ++x) {
+      const int right = row[x + 1] - row[x], down = row[x + width_] - row[x];
+      of_row += right * right + down * down;
+    }
+    sum += of_row;
+  }
+  return static_cast<double>(sum);
+}
+
 Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   ++since_reference_;
+  canvas_moved_ = {};
   if (anew_ || !finder_.known()) {
     begin(grey, ignored);
     return pose_;
   }
-  const Motion motion = finder_.find(grey, pose_, turns_);
+  const Motion motion = finder_.find(grey, compose(inverse(offset_), pose_), turns_);
   const double farthest = kFarthest * std::max(width_, height_);
   const bool beyond = motion.found && std::hypot(motion.pose.x, motion.pose.y) > farthest;
   if (motion.found && !beyond) {
     lost_ = beyond_ = 0;
-    pose_ = motion.pose;
+    pose_ = compose(offset_, motion.pose);
+    if (candidates_ > 0) choose_canvas(grey);
     return pose_;
   }
   ++lost_;
@@ -69,19 +91,36 @@ Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   return pose_;
 }
 
+void Stabilizer::choose_canvas(const uint8_t* grey) {
+  // Who stands still needs no other canvas.
+  const double sharp = pose_.is_rest() ? 0 : sharpness(grey);
+  if (sharp > sharpest_) sharpest_ = sharp, sharpest_pose_ = pose_;
+  if (--candidates_ > 0) return;
+  const Pose& to = sharpest_pose_;
+  canvas_moved_ = {to.x - std::round(to.x), to.y - std::round(to.y)};
+  if (canvas_moved_.is_rest()) return;
+  offset_ = {-canvas_moved_.x, -canvas_moved_.y};
+  pose_ = compose(offset_, pose_);
+  summed_ = 0;
+}
+
 void Stabilizer::saw(const uint8_t* grey, const IgnoredAreas& ignored) {
   if (summed_ >= kFirstFrames || lost_ > 0) return;
+  if (summed_ == 0) std::fill(sum_.begin(), sum_.end(), uint16_t{0});
   ++summed_;
   for (size_t i = 0; i < sum_.size(); ++i) sum_[i] = static_cast<uint16_t>(sum_[i] + grey[i]);
   if (summed_ != kFirstFrames) return;
   for (size_t i = 0; i < sum_.size(); ++i)
     mean_[i] = static_cast<uint8_t>((sum_[i] + kFirstFrames / 2) / kFirstFrames);
   finder_.take_reference(mean_.data(), ignored);
+  offset_ = {};
 }
 
 void Stabilizer::refer_to(const uint8_t* grey, const IgnoredAreas& ignored) {
   finder_.take_reference(grey, ignored);
   summed_ = kFirstFrames;
+  candidates_ = 0;
+  offset_ = {};
   since_reference_ = 0;
   anew_ = false;
 }

@@ -19,7 +19,9 @@ enum class Stabilize {
 };
 
 // Frames are compared with the first one, then with the mean of the first few, and then with the
-// background that was learnt. Poses are relative to the first one's, which is the canvas. A camera
+// background that was learnt. The canvas is the first frame; if the camera moves at once, it is
+// moved by less than a pixel once the first few have come, to where the sharpest of them falls on
+// whole pixels, so that this one is not blurred by interpolation. A camera
 // that looks further beside its place than an eighth of the picture shows another view: the canvas
 // is then the newest frame.
 class Stabilizer {
@@ -40,6 +42,8 @@ class Stabilizer {
   Pose follow(const uint8_t* grey, const IgnoredAreas& ignored);
   // The same frame on the canvas.
   void saw(const uint8_t* grey, const IgnoredAreas& ignored);
+  // Where the newest frame's canvas is on that of the frames before; at rest nearly always.
+  const Pose& canvas_moved() const { return canvas_moved_; }
   // The background picture that frames are compared with from now on.
   void refer_to(const uint8_t* grey, const IgnoredAreas& ignored);
   // Frames since that.
@@ -55,6 +59,8 @@ class Stabilizer {
 
  private:
   void begin(const uint8_t* grey, const IgnoredAreas& ignored);
+  double sharpness(const uint8_t* grey) const;
+  void choose_canvas(const uint8_t* grey);
 
   bool turns_;
   int channel_, width_, height_;
@@ -63,6 +69,11 @@ class Stabilizer {
   std::vector<uint16_t> sum_;  // of the first frames
   std::vector<uint8_t> mean_;
   int summed_ = 0;
+  int candidates_ = 0;   // frames that are still compared
+  double sharpest_ = 0;  // of those that were, and where its camera looked
+  Pose sharpest_pose_;
+  Pose offset_;  // of the canvas, from the picture that frames are compared with
+  Pose canvas_moved_;
   bool anew_ = true;
   Pose pose_;
   int lost_ = 0, beyond_ = 0;

@@ -23,9 +23,21 @@ bool Schedule::take(const ImageView& frame) {
   const PlaneSlots& planes = frames().window();
   const int slot = frames().window().newest_slot(), channel = stabilizer->channel();
   const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
-  if (!pose.is_rest()) no_room_ = !frames().steady(pose, &stabilizer->resampler(), idle_pool());
+  if (!pose.is_rest())
+    no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());
+  if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
   stabilizer->saw(planes.plane(slot, channel), ignored);
   return true;
+}
+
+// Frames before the newest, where they are still looked at and nothing was made of them yet.
+void Schedule::move_canvas(const Pose& to) {
+  if (!holds_frames() || !background().learner().in_one_piece() || no_room_) return;
+  wait();
+  for (int i = 0; i + 1 < frames().size() && !no_room_; ++i) {
+    const Pose pose = compose(inverse(to), frames().pose(frames().slot(i)));
+    no_room_ = !frames().steady(i, pose, &stage_.stabilizer->resampler(), &workers().pool());
+  }
 }
 
 }  // namespace qdmd

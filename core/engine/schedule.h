@@ -73,6 +73,8 @@ class Schedule {
   // Copies a frame in, and moves it to where the camera saw the background. False:
   // FrameStore::append.
   bool take(const ImageView& frame);
+  // True where frames before the newest are compared with backgrounds to come.
+  virtual bool holds_frames() const = 0;
   // Nothing that is known of the camera and its background holds for the next frame.
   void forget_camera() {
     if (stage_.stabilizer) stage_.stabilizer->forget();
@@ -111,6 +113,8 @@ class Schedule {
   void hold_up() { held_up_ = true; }
 
  private:
+  void move_canvas(const Pose& to);
+
   Stage stage_;
   bool held_up_ = false, no_room_ = false;
   uint64_t scenes_ = 0;

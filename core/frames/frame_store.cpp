@@ -95,21 +95,23 @@ void FrameStore::take_contents(int slot) {
     for (int c = 0; c < kChannels; ++c) cell_means(grid_, planes[c], cells_.plane(slot, c));
 }
 
-bool FrameStore::steady(const Pose& pose, Resampler* resampler, Pool* pool) {
+bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {
   if (planes_.shape().is_shared()) return false;
   if (untouched_.capacity() == 0) {
     const uint64_t more = PlaneSlots::bytes(capacity(), planes_.pixels());
     if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
     untouched_ = PlaneSlots(capacity(), planes_.pixels());
   }
-  const int slot = planes_.newest_slot(), before = size() > 1 ? this->slot(size() - 2) : slot;
+  const int slot = this->slot(index), before = index > 0 ? this->slot(index - 1) : slot;
+  const bool was_moved = !this->pose(slot).is_rest();
   resampler->prepare(pool);
   for (int c = 0; c < kChannels; ++c) {
-    std::copy_n(planes_.plane(slot, c), planes_.pixels(), untouched_.plane(slot, c));
-    if (before != slot)
-      std::copy_n(planes_.plane(before, c), planes_.pixels(), planes_.plane(slot, c));
+    uint8_t* const plane = planes_.plane(slot, c);
+    if (!was_moved) std::copy_n(plane, planes_.pixels(), untouched_.plane(slot, c));
+    std::copy_n(before != slot ? planes_.plane(before, c) : untouched_.plane(slot, c),
+                planes_.pixels(), plane);
     resampler->run(untouched_.plane(slot, c), affine(inverse(pose), middle_of(width_, height_)),
-                   planes_.plane(slot, c), width_, height_, pool);
+                   plane, width_, height_, pool);
   }
   poses_[static_cast<size_t>(slot)] = pose;
   take_contents(slot);

@@ -44,11 +44,11 @@ class FrameStore {
   // varies, which needs more than `most_bytes`. Throws std::bad_alloc. The newest frame is then
   // undefined.
   bool append(const ImageView& frame);
-  // The newest frame's planes, samples and cells become what the canvas shows of them; the planes
+  // The planes, samples and cells of frame `index` become what the canvas shows of them; the planes
   // as they came stay in untouched(). What is outside of the frame is as in the frame before, or,
   // where there is none, as in this one. False, and nothing is done: there is no room in
   // `most_bytes`, or the frame's pixels share samples. Throws std::bad_alloc.
-  bool steady(const Pose& pose, Resampler* resampler, Pool* pool);
+  bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
   // Forgets all frames.
   void clear() { planes_.clear(); }
 
