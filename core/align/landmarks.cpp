@@ -10,8 +10,6 @@ namespace {
 
 // Levels a pixel: less is noise.
 constexpr int kLeastSlope = 5;
-// Landmarks that are needed to say anything.
-constexpr int kFewest = 12;
 // Tukey's constant, in standard deviations.
 constexpr float kTukey = 4.685f;
 // Of samples that are rounded, and interpolated between.
@@ -162,7 +160,7 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
   const auto half = static_cast<float>(std::max(1.0, std::max(middle.x, middle.y)));
   const auto middle_x = static_cast<float>(middle.x), middle_y = static_cast<float>(middle.y);
   const float limit = kTukey * static_cast<float>(fit.noise), over = 1 / (limit * limit);
-  double squares = 0, weights = 0;
+  double squares = 0, weights = 0, likeness = 0;
   int inside = 0, fitting = 0;
   for (size_t i = 0; i < static_cast<size_t>(count_); ++i) {
     const float e = residual_[i];
@@ -172,6 +170,7 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
     ++fitting;
     const float weight = far * far;
     weights += weight;
+    likeness += weight * far;
     squares += weight * e * e;
     const float u = (x_[i] - middle_x) / half, v = (y_[i] - middle_y) / half;
     const float row[kUnknown + 1] = {level_[i] - 128,
@@ -188,7 +187,8 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
       sums[static_cast<size_t>(a)][kUnknown] += weighted * e;
     }
   }
-  fit.agree = inside > 0 ? static_cast<double>(fitting) / inside : 0;
+  // Of normal noise it is 0.87.
+  fit.agree = inside > 0 ? std::min(1.0, likeness / 0.87 / inside) : 0;
   // Where little of the canvas is in the frame, or nothing fits.
   if (fitting < kFewest || inside < count_ / 4) return fit;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kUnknown, kUnknown>;

@@ -26,8 +26,10 @@ struct Fit {
   Pose pose;         // of the frame, by one step of Gauss and Newton
   GreyLight light;   // over the landmarks' picture
   double noise = 0;  // levels: the standard deviation of those landmarks that fit
-  double agree = 0;  // share of the landmarks inside of the frame that fit before the step, 0 .. 1
-  double error = 0;  // pixels: the standard deviation of the step's shift
+  // Share of the landmarks inside of the frame that fit before the step, the better the more (1
+  // less Tukey's loss), 0 .. 1.
+  double agree = 0;
+  double error = 0;    // pixels: the standard deviation of the step's shift
   bool known = false;  // there were enough of them
 };
 
@@ -41,6 +43,8 @@ class Landmarks {
   // Those of `picture`, in place of the old ones; none where `ignored` is.
   void choose(const GreyView& picture, const IgnoredAreas& ignored, int ignored_scale);
   int count() const { return count_; }
+  // Landmarks that are needed to say anything.
+  static constexpr int kFewest = 12;
 
   // Compares a frame, seen from `pose`, with the landmarks' picture: the inverse compositional step
   // (Baker and Matthews 2004) with Tukey's weights, their scale from the residuals' lower part, so

@@ -1,4 +1,6 @@
 #include "core/align/motion.h"
+#include <cstdio>
+#include <cstdlib>
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +19,17 @@ constexpr double kSure = 4;
 constexpr double kReach = 1.0 / 8;
 // Less agreement than this is none.
 constexpr double kLeastAgree = 0.25;
+// Who moved fits at least so much.
+constexpr double kMovedAgree = 0.45;
 // At rest so many fit in one look; fewer, and somebody stands before more than half of them.
 constexpr double kRestAgree = 0.45;
+// Levels: the most that frames may differ by from the first reference.
+constexpr double kMostNoise = 12;
+// Frames of which so much fits tell the noise.
+constexpr double kTypical = 0.6;
+// The share of the landmarks by which a pose must fit better than another one; less where they are
+// nearer than a pixel and kNear.
+constexpr double kClearly = 0.1, kNear = 0.3;
 // Levels: frames that differ by more from the first reference may have been moved.
 constexpr double kFirstNoise = 4;
 
@@ -127,33 +138,36 @@ Fit MotionFinder::refine(size_t level, const uint8_t* grey, Pose pose, bool turn
   return fit;
 }
 
-Motion MotionFinder::find(const uint8_t* grey, const Pose& before, bool turns) {
+Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& rest, bool turns) {
   Motion motion;
   if (!known_) return motion;
   const Level& full = levels_[0];
-  const auto way = [&](const Pose& pose) {
-    return largest_way(pose, Pose(), full.width, full.height);
-  };
   const auto at_rest = [&](const Fit& fit) {
-    return way(fit.pose) < std::max(kRest, kSure * fit.error);
+    return largest_way(fit.pose, rest, full.width, full.height) <
+           std::max(kRest, kSure * fit.error);
   };
   const auto settle = [&](const Fit& fit, const Pose& pose) {
     motion.pose = pose;
     motion.agree = fit.agree;
     motion.found = true;
     light_ = fit.light;
-    noise_ = noise_ > 0 ? noise_ + 0.1 * (fit.noise - noise_) : fit.noise;
+    // Crowds are no noise.
+    if (noise_ == 0)
+      noise_ = std::min(fit.noise, kMostNoise);
+    else if (fit.agree >= kTypical)
+      noise_ += 0.1 * (std::min(fit.noise, 1.5 * noise_) - noise_);
     return motion;
   };
   Landmarks& marks = levels_[0].marks;
-  const Fit look = marks.step(view(0, grey), Pose(), light_, turns);
+  const Fit look = marks.step(view(0, grey), rest, light_, turns);
   // A picture without edges shows no motion.
   if (!look.known) {
+    motion.pose = rest;
     motion.found = true;
     return motion;
   }
   const bool quiet = noise_ == 0 ? look.noise < kFirstNoise : look.noise < 1 + 1.5 * noise_;
-  if (quiet && look.agree >= kRestAgree && at_rest(look)) return settle(look, Pose());
+  if (quiet && look.agree >= kRestAgree && at_rest(look)) return settle(look, rest);
 
   build(grey);
   Fit fit;
@@ -163,14 +177,33 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, bool turns) {
     if (next.known) fit = next;
   }
   if (!fit.known) return motion;
-  // What fits must do so within the noise of frames that fitted, and better than rest.
-  const double noise = noise_ > 0 ? std::min(fit.noise, 1.5 * noise_) : fit.noise;
-  const Fit there = marks.step(view(0, grey), fit.pose, fit.light, turns, noise);
-  const Fit here = marks.step(view(0, grey), Pose(), look.light, turns, noise);
-  if (std::max(there.agree, here.agree) < kLeastAgree) return motion;
-  if (here.agree >= there.agree || at_rest(fit)) return settle(here, Pose());
-  fit.agree = there.agree;
-  return settle(fit, fit.pose);
+  // What fits must do so within the noise of frames that fitted, and clearly better than where the
+  // camera was: a crowd that covers the scene fits somewhere, too.
+  const double noise =
+      std::min(fit.noise, std::min(kMostNoise, noise_ > 0 ? 1 + 1.2 * noise_ : kMostNoise));
+  const auto fits_at = [&](const Pose& pose, const GreyLight& light) {
+    return marks.step(view(0, grey), pose, light, turns, noise).agree;
+  };
+  const auto gain_over = [&](const Pose& pose) {
+    const double far = largest_way(fit.pose, pose, full.width, full.height);
+    return std::min(kClearly, kClearly * std::max(0.0, far - kNear));
+  };
+  const double there = fits_at(fit.pose, fit.light), here = fits_at(rest, look.light),
+               then = fits_at(before, fit.light);
+  if (getenv("DBG"))
+    fprintf(
+        stderr,
+        "pose %.2f %.2f noise %.2f known %.2f fit %.2f there %.2f here %.2f then %.2f err %.3f\n",
+        fit.pose.x, fit.pose.y, noise, noise_, fit.noise, there, here, then, fit.error);
+  if (std::max({there, here, then}) < kLeastAgree) return motion;
+  fit.noise = noise;
+  if (!at_rest(fit) && there >= kMovedAgree && there > here + gain_over(rest) &&
+      there >= then + gain_over(before)) {
+    fit.agree = there;
+    return settle(fit, fit.pose);
+  }
+  fit.agree = std::max(here, then);
+  return settle(fit, here >= then ? rest : before);
 }
 
 }  // namespace qdmd

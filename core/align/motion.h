@@ -10,7 +10,7 @@ namespace qdmd {
 
 // Of a frame.
 struct Motion {
-  // `rest` where it is less than a tenth of a pixel, or less than can be known.
+  // `rest` where it differs by less than a tenth of a pixel from it, or by less than can be known.
   Pose pose;
   double agree = 0;    // share of the landmarks that fit, 0 .. 1
   bool found = false;  // else the pose is nothing: too little fits
@@ -30,9 +30,12 @@ class MotionFinder {
   void take_reference(const uint8_t* grey, const IgnoredAreas& ignored);
   bool known() const { return known_; }
   void forget();
+  // Nothing in the reference tells where it is.
+  bool is_blank() const { return levels_[0].marks.count() < Landmarks::kFewest; }
 
-  // Of a frame, which comes after one that was at `before`. turns: angle and scale are free.
-  Motion find(const uint8_t* grey, const Pose& before, bool turns);
+  // Of a frame, which comes after one that was at `before`; it is looked for at `rest` first.
+  // turns: angle and scale are free.
+  Motion find(const uint8_t* grey, const Pose& before, const Pose& rest, bool turns);
 
  private:
   struct Level {

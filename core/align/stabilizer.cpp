@@ -6,8 +6,10 @@
 namespace qdmd {
 namespace {
 
-// First frames whose mean is the reference until there is a background.
+// First frames of which one is the sharpest.
 constexpr int kFirstFrames = 16;
+// Frames until another one is tried where the first one shows nothing.
+constexpr int kTryAgain = 8;
 
 // A frame for which the canvas is moved is sharper by so much.
 constexpr double kSharper = 1.03;
@@ -24,29 +26,25 @@ Stabilizer::Stabilizer(Stabilize how, Colours colours, int width, int height)
       channel_(colours == Colours::rgb ? 1 : 0),
       width_(width),
       height_(height),
-      finder_(width, height),
-      sum_(static_cast<size_t>(width) * static_cast<size_t>(height)),
-      mean_(sum_.size()) {}
+      finder_(width, height) {}
 
-uint64_t Stabilizer::bytes(int width, int height) {
-  const uint64_t pixels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
-  return MotionFinder::bytes(width, height) + pixels * (sizeof(uint16_t) + 1);
-}
+uint64_t Stabilizer::bytes(int width, int height) { return MotionFinder::bytes(width, height); }
 
 void Stabilizer::forget() {
   finder_.forget();
   anew_ = true;
   pose_ = {};
-  lost_ = beyond_ = summed_ = 0;
+  lost_ = beyond_ = 0;
 }
 
 void Stabilizer::begin(const uint8_t* grey, const IgnoredAreas& ignored) {
   finder_.forget();
   finder_.take_reference(grey, ignored);
-  summed_ = lost_ = beyond_ = 0;
-  candidates_ = turns_ ? 0 : kFirstFrames;
+  lost_ = beyond_ = 0;
+  candidates_ = kFirstFrames;
   sharpest_ = candidates_ > 0 ? kSharper * sharpness(grey) : 0;
   sharpest_pose_ = offset_ = canvas_moved_ = {};
+  way_ = {};
   since_reference_ = 0;
   pose_ = {};
   anew_ = false;
@@ -70,16 +68,17 @@ double Stabilizer::sharpness(const uint8_t* grey) const {
 Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   ++since_reference_;
   canvas_moved_ = {};
-  if (anew_ || !finder_.known()) {
+  if (anew_ || !finder_.known() || (finder_.is_blank() && since_reference_ % kTryAgain == 0)) {
     begin(grey, ignored);
     return pose_;
   }
-  const Motion motion = finder_.find(grey, compose(inverse(offset_), pose_), turns_);
+  const Motion motion =
+      finder_.find(grey, compose(inverse(offset_), pose_), inverse(offset_), turns_);
   const double farthest = kFarthest * std::max(width_, height_);
   const bool beyond = motion.found && std::hypot(motion.pose.x, motion.pose.y) > farthest;
   if (motion.found && !beyond) {
     lost_ = beyond_ = 0;
-    pose_ = compose(offset_, motion.pose);
+    pose_ = motion.pose == inverse(offset_) ? Pose() : compose(offset_, motion.pose);
     if (candidates_ > 0) choose_canvas(grey);
     return pose_;
   }
@@ -95,30 +94,19 @@ void Stabilizer::choose_canvas(const uint8_t* grey) {
   // Who stands still needs no other canvas.
   const double sharp = pose_.is_rest() ? 0 : sharpness(grey);
   if (sharp > sharpest_) sharpest_ = sharp, sharpest_pose_ = pose_;
+  way_.x += pose_.x, way_.y += pose_.y;
   if (--candidates_ > 0) return;
+  // By whole pixels from the sharpest one, in the middle of all.
   const Pose& to = sharpest_pose_;
-  canvas_moved_ = {to.x - std::round(to.x), to.y - std::round(to.y)};
+  canvas_moved_ = {to.x + std::round(way_.x / kFirstFrames - to.x),
+                   to.y + std::round(way_.y / kFirstFrames - to.y), to.angle, to.scale};
   if (canvas_moved_.is_rest()) return;
-  offset_ = {-canvas_moved_.x, -canvas_moved_.y};
+  offset_ = inverse(canvas_moved_);
   pose_ = compose(offset_, pose_);
-  summed_ = 0;
-}
-
-void Stabilizer::saw(const uint8_t* grey, const IgnoredAreas& ignored) {
-  if (summed_ >= kFirstFrames || lost_ > 0) return;
-  if (summed_ == 0) std::fill(sum_.begin(), sum_.end(), uint16_t{0});
-  ++summed_;
-  for (size_t i = 0; i < sum_.size(); ++i) sum_[i] = static_cast<uint16_t>(sum_[i] + grey[i]);
-  if (summed_ != kFirstFrames) return;
-  for (size_t i = 0; i < sum_.size(); ++i)
-    mean_[i] = static_cast<uint8_t>((sum_[i] + kFirstFrames / 2) / kFirstFrames);
-  finder_.take_reference(mean_.data(), ignored);
-  offset_ = {};
 }
 
 void Stabilizer::refer_to(const uint8_t* grey, const IgnoredAreas& ignored) {
   finder_.take_reference(grey, ignored);
-  summed_ = kFirstFrames;
   candidates_ = 0;
   offset_ = {};
   since_reference_ = 0;

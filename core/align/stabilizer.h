@@ -18,12 +18,11 @@ enum class Stabilize {
   similarity    // and is turned, and sees more or less
 };
 
-// Frames are compared with the first one, then with the mean of the first few, and then with the
-// background that was learnt. The canvas is the first frame; if the camera moves at once, it is
-// moved by less than a pixel once the first few have come, to where the sharpest of them falls on
-// whole pixels, so that this one is not blurred by interpolation. A camera
-// that looks further beside its place than an eighth of the picture shows another view: the canvas
-// is then the newest frame.
+// Frames are compared with the first one, and then with the background that was learnt. The canvas
+// is the first frame; if the camera moves at once, it is moved by less than a pixel once the first
+// few have come, to where the sharpest of them falls on whole pixels, so that this one is not
+// blurred by interpolation. A camera that looks further beside its place than an eighth of the
+// picture shows another view: the canvas is then the newest frame.
 class Stabilizer {
  public:
   // Takes all memory. For frames of width x height pixels.
@@ -40,8 +39,6 @@ class Stabilizer {
   // The pose of the next frame, whose channel is `grey`. Where too little is seen of the scene,
   // that of the frame before.
   Pose follow(const uint8_t* grey, const IgnoredAreas& ignored);
-  // The same frame on the canvas.
-  void saw(const uint8_t* grey, const IgnoredAreas& ignored);
   // Where the newest frame's canvas is on that of the frames before; at rest nearly always.
   const Pose& canvas_moved() const { return canvas_moved_; }
   // The background picture that frames are compared with from now on.
@@ -66,12 +63,10 @@ class Stabilizer {
   int channel_, width_, height_;
   MotionFinder finder_;
   Resampler resampler_;
-  std::vector<uint16_t> sum_;  // of the first frames
-  std::vector<uint8_t> mean_;
-  int summed_ = 0;
   int candidates_ = 0;   // frames that are still compared
   double sharpest_ = 0;  // of those that were, and where its camera looked
   Pose sharpest_pose_;
+  Point way_;    // the sum of their shifts
   Pose offset_;  // of the canvas, from the picture that frames are compared with
   Pose canvas_moved_;
   bool anew_ = true;

@@ -26,7 +26,6 @@ bool Schedule::take(const ImageView& frame) {
   if (!pose.is_rest())
     no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());
   if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
-  stabilizer->saw(planes.plane(slot, channel), ignored);
   return true;
 }
 
