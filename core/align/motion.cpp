@@ -1,6 +1,4 @@
 #include "core/align/motion.h"
-#include <cstdio>
-#include <cstdlib>
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +21,8 @@ constexpr double kLeastAgree = 0.25;
 constexpr double kMovedAgree = 0.45;
 // At rest so many fit in one look; fewer, and somebody stands before more than half of them.
 constexpr double kRestAgree = 0.45;
+// Nobody looks further where so much fits next to rest.
+constexpr double kAtOnce = 0.75;
 // Levels: the most that frames may differ by from the first reference.
 constexpr double kMostNoise = 12;
 // Frames of which so much fits tell the noise.
@@ -138,6 +138,18 @@ Fit MotionFinder::refine(size_t level, const uint8_t* grey, Pose pose, bool turn
   return fit;
 }
 
+// From the top of the pyramid down.
+Fit MotionFinder::find_afar(const uint8_t* grey, const Pose& before, bool turns) {
+  build(grey);
+  Fit fit;
+  fit.pose = search(grey, before);
+  for (size_t k = levels_.size(); k-- > 0;) {
+    const Fit next = refine(k, grey, fit.pose, turns, k == 0 ? 8 : 4, k == 0 ? 0.005 : 0.02);
+    if (next.known) fit = next;
+  }
+  return fit;
+}
+
 Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& rest, bool turns) {
   Motion motion;
   if (!known_) return motion;
@@ -169,13 +181,11 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   const bool quiet = noise_ == 0 ? look.noise < kFirstNoise : look.noise < 1 + 1.5 * noise_;
   if (quiet && look.agree >= kRestAgree && at_rest(look)) return settle(look, rest);
 
-  build(grey);
+  const bool near = quiet && look.agree >= kRestAgree &&
+                    largest_way(look.pose, rest, full.width, full.height) < 1;
   Fit fit;
-  fit.pose = search(grey, before);
-  for (size_t k = levels_.size(); k-- > 0;) {
-    const Fit next = refine(k, grey, fit.pose, turns, k == 0 ? 8 : 4, k == 0 ? 0.005 : 0.02);
-    if (next.known) fit = next;
-  }
+  if (near) fit = refine(0, grey, rest, turns, 4, 0.01);
+  if (!fit.known || fit.agree < kAtOnce) fit = find_afar(grey, before, turns);
   if (!fit.known) return motion;
   // What fits must do so within the noise of frames that fitted, and clearly better than where the
   // camera was: a crowd that covers the scene fits somewhere, too.
@@ -190,11 +200,6 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   };
   const double there = fits_at(fit.pose, fit.light), here = fits_at(rest, look.light),
                then = fits_at(before, fit.light);
-  if (getenv("DBG"))
-    fprintf(
-        stderr,
-        "pose %.2f %.2f noise %.2f known %.2f fit %.2f there %.2f here %.2f then %.2f err %.3f\n",
-        fit.pose.x, fit.pose.y, noise, noise_, fit.noise, there, here, then, fit.error);
   if (std::max({there, here, then}) < kLeastAgree) return motion;
   fit.noise = noise;
   if (!at_rest(fit) && there >= kMovedAgree && there > here + gain_over(rest) &&

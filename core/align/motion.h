@@ -47,6 +47,7 @@ class MotionFinder {
   void build(const uint8_t* grey);
   GreyView view(size_t level, const uint8_t* grey) const;
   Pose search(const uint8_t* grey, const Pose& before) const;
+  Fit find_afar(const uint8_t* grey, const Pose& before, bool turns);
   Fit refine(size_t level, const uint8_t* grey, Pose pose, bool turns, int steps, double enough);
 
   std::vector<Level> levels_;

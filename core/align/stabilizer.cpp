@@ -13,6 +13,9 @@ constexpr int kTryAgain = 8;
 
 // A frame for which the canvas is moved is sharper by so much.
 constexpr double kSharper = 1.03;
+// Pixels that wake it, and so little for so many frames that it sleeps again.
+constexpr double kWakes = 0.75, kCalm = 0.2;
+constexpr int kSleeps = 250;
 // Of the picture's longer side: further beside is another view.
 constexpr double kFarthest = 1.0 / 8;
 // Frames in a row that are beyond that, and that show nothing that is known.
@@ -33,6 +36,7 @@ uint64_t Stabilizer::bytes(int width, int height) { return MotionFinder::bytes(w
 void Stabilizer::forget() {
   finder_.forget();
   anew_ = true;
+  awake_ = false;
   pose_ = {};
   lost_ = beyond_ = 0;
 }
@@ -47,6 +51,8 @@ void Stabilizer::begin(const uint8_t* grey, const IgnoredAreas& ignored) {
   way_ = {};
   since_reference_ = 0;
   pose_ = {};
+  awake_ = false;
+  calm_ = 0;
   anew_ = false;
 }
 
@@ -80,14 +86,22 @@ Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
     lost_ = beyond_ = 0;
     pose_ = motion.pose == inverse(offset_) ? Pose() : compose(offset_, motion.pose);
     if (candidates_ > 0) choose_canvas(grey);
-    return pose_;
+    return applied();
   }
   ++lost_;
   beyond_ = beyond ? beyond_ + 1 : 0;
-  if (beyond_ < kBeyond && lost_ < kLost) return pose_;
+  if (beyond_ < kBeyond && lost_ < kLost) return applied();
   if (beyond) ++views_;
   begin(grey, ignored);
   return pose_;
+}
+
+// Of the newest frame.
+Pose Stabilizer::applied() {
+  const double way = largest_way(pose_, Pose(), width_, height_);
+  calm_ = way < kCalm ? calm_ + 1 : 0;
+  awake_ = way > kWakes || (awake_ && calm_ < kSleeps);
+  return awake_ ? pose_ : Pose();
 }
 
 void Stabilizer::choose_canvas(const uint8_t* grey) {
@@ -100,6 +114,7 @@ void Stabilizer::choose_canvas(const uint8_t* grey) {
   const Pose& to = sharpest_pose_;
   canvas_moved_ = {to.x + std::round(way_.x / kFirstFrames - to.x),
                    to.y + std::round(way_.y / kFirstFrames - to.y), to.angle, to.scale};
+  if (!awake_) canvas_moved_ = {};
   if (canvas_moved_.is_rest()) return;
   offset_ = inverse(canvas_moved_);
   pose_ = compose(offset_, pose_);

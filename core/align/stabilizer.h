@@ -36,8 +36,8 @@ class Stabilizer {
   // The channel that frames are compared by.
   int channel() const { return channel_; }
 
-  // The pose of the next frame, whose channel is `grey`. Where too little is seen of the scene,
-  // that of the frame before.
+  // The pose that the next frame is moved from, whose channel is `grey`. Where too little is seen
+  // of the scene, that of the frame before.
   Pose follow(const uint8_t* grey, const IgnoredAreas& ignored);
   // Where the newest frame's canvas is on that of the frames before; at rest nearly always.
   const Pose& canvas_moved() const { return canvas_moved_; }
@@ -46,8 +46,9 @@ class Stabilizer {
   // Frames since that.
   int64_t frames_since_reference() const { return since_reference_; }
 
-  // Of the newest frame.
-  const Pose& pose() const { return pose_; }
+  // Where the newest frame's camera looked. Frames are only moved once it was further off than the
+  // width of an edge: interpolation blurs more than less does.
+  const Pose& motion() const { return pose_; }
   // Frames in a row that showed too little of the scene, the newest included.
   int lost() const { return lost_; }
   // How often the camera went on to another view.
@@ -58,6 +59,7 @@ class Stabilizer {
   void begin(const uint8_t* grey, const IgnoredAreas& ignored);
   double sharpness(const uint8_t* grey) const;
   void choose_canvas(const uint8_t* grey);
+  Pose applied();
 
   bool turns_;
   int channel_, width_, height_;
@@ -71,6 +73,8 @@ class Stabilizer {
   Pose canvas_moved_;
   bool anew_ = true;
   Pose pose_;
+  bool awake_ = false;
+  int calm_ = 0;  // frames in a row that nearly were at rest
   int lost_ = 0, beyond_ = 0;
   int64_t since_reference_ = 0;
   uint64_t views_ = 0;

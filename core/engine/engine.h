@@ -105,7 +105,7 @@ class Engine {
   void set_stabilize_output(bool stabilize) { stabilize_output_ = stabilize; }
   // Where the camera looked in the newest frame that was pushed, and in that which pop() gives next
   // (at rest where none waits).
-  Pose newest_pose() const { return stabilizer_ ? stabilizer_->pose() : Pose(); }
+  Pose newest_pose() const { return stabilizer_ ? stabilizer_->motion() : Pose(); }
   Pose next_pose() const;
   // How often the camera went on, further than an eighth of the picture, to another view.
   uint64_t views() const { return stabilizer_ ? stabilizer_->views() : 0; }
