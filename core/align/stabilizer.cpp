@@ -41,6 +41,12 @@ void Stabilizer::forget() {
   lost_ = beyond_ = 0;
 }
 
+void Stabilizer::begin_scene() {
+  anew_ = true;
+  if (beyond_ > 0) ++views_;
+  beyond_ = 0;
+}
+
 void Stabilizer::begin(const uint8_t* grey, const IgnoredAreas& ignored) {
   finder_.forget();
   finder_.take_reference(grey, ignored);
@@ -74,6 +80,7 @@ double Stabilizer::sharpness(const uint8_t* grey) const {
 Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   ++since_reference_;
   canvas_moved_ = {};
+  began_view_ = false;
   if (anew_ || !finder_.known() || (finder_.is_blank() && since_reference_ % kTryAgain == 0)) {
     begin(grey, ignored);
     return pose_;
@@ -92,6 +99,7 @@ Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   beyond_ = beyond ? beyond_ + 1 : 0;
   if (beyond_ < kBeyond && lost_ < kLost) return applied();
   if (beyond) ++views_;
+  began_view_ = beyond;
   begin(grey, ignored);
   return pose_;
 }

@@ -32,7 +32,9 @@ class Stabilizer {
   // The next frame is of another stream.
   void forget();
   // The next frame begins a new scene, and is its canvas.
-  void begin_scene() { anew_ = true; }
+  void begin_scene();
+  // The newest frame is of another view, on which the camera went.
+  bool began_view() const { return began_view_; }
   // The channel that frames are compared by.
   int channel() const { return channel_; }
 
@@ -76,6 +78,7 @@ class Stabilizer {
   bool awake_ = false;
   int calm_ = 0;  // frames in a row that nearly were at rest
   int lost_ = 0, beyond_ = 0;
+  bool began_view_ = false;
   int64_t since_reference_ = 0;
   uint64_t views_ = 0;
 };

@@ -104,9 +104,12 @@ class Schedule {
   SceneSeen scene_seen() {
     if (!background().known() || background().state() == Background::State::held)
       return SceneSeen::same;
-    const SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    if (stage_.stabilizer && stage_.stabilizer->began_view())
+      seen = SceneSeen::another;
+    else if (stage_.stabilizer && seen != SceneSeen::same)
+      stage_.stabilizer->begin_scene();
     scenes_ += seen == SceneSeen::same ? 0 : 1;
-    if (seen != SceneSeen::same && stage_.stabilizer) stage_.stabilizer->begin_scene();
     return seen;
   }
   // For work of a solve that is done at once.
