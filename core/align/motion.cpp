@@ -23,6 +23,8 @@ constexpr double kMovedAgree = 0.45;
 constexpr double kRestAgree = 0.45;
 // Nobody looks further where so much fits next to rest.
 constexpr double kAtOnce = 0.75;
+// More than that is another view, and more than resample() does.
+constexpr double kMostAngle = 0.05, kMostGrowth = 0.05;
 // Levels: the most that frames may differ by from the first reference.
 constexpr double kMostNoise = 12;
 // Frames of which so much fits tell the noise.
@@ -186,7 +188,9 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   Fit fit;
   if (near) fit = refine(0, grey, rest, turns, 4, 0.01);
   if (!fit.known || fit.agree < kAtOnce) fit = find_afar(grey, before, turns);
-  if (!fit.known) return motion;
+  if (!fit.known || std::abs(fit.pose.angle) > kMostAngle ||
+      std::abs(fit.pose.scale - 1) > kMostGrowth)
+    return motion;
   // What fits must do so within the noise of frames that fitted, and clearly better than where the
   // camera was: a crowd that covers the scene fits somewhere, too.
   const double noise =

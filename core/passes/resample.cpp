@@ -112,7 +112,22 @@ void along_columns(const float* columns, size_t stride, float place, float step,
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto way_of = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
   const float last = step * static_cast<float>(lanes - 1);
-  const int taps = step == 0 ? kTaps : kTaps + 1;
+  if (step == 0) {
+    const float whole = std::floor(place);
+    Vector weight[kTaps];
+    for (int k = 0; k < kTaps; ++k)
+      weight[k] = weight_of(hn::Set(d, place - whole + kBefore - static_cast<float>(k)));
+    const float* const first =
+        columns + (static_cast<ptrdiff_t>(whole) - kBefore) * static_cast<ptrdiff_t>(stride);
+    for (int i = 0; i < count; i += lanes) {
+      const float* from = first + i;
+      auto sum = hn::Mul(weight[0], hn::LoadU(d, from));
+      for (int k = 1; k < kTaps; ++k)
+        sum = hn::Add(sum, hn::Mul(weight[k], hn::LoadU(d, from += stride)));
+      store_levels(sum, to + i);
+    }
+    return;
+  }
   for (int i = 0; i < count; i += lanes) {
     const float at = place + static_cast<float>(i) * step;
     const float whole = std::floor(std::min(at, at + last));
@@ -120,7 +135,7 @@ void along_columns(const float* columns, size_t stride, float place, float step,
         columns + (static_cast<ptrdiff_t>(whole) - kBefore) * static_cast<ptrdiff_t>(stride) + i;
     const auto way = hn::Add(hn::Set(d, at - whole + kBefore), way_of);
     auto sum = hn::Zero(d);
-    for (int k = 0; k < taps; ++k, from += stride)
+    for (int k = 0; k <= kTaps; ++k, from += stride)
       sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
                                  hn::LoadU(d, from)));
     store_levels(sum, to + i);
