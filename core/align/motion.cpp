@@ -24,7 +24,7 @@ constexpr double kRestAgree = 0.45;
 // Nobody looks further where so much fits next to rest.
 constexpr double kAtOnce = 0.75;
 // More than that is another view, and more than resample() does.
-constexpr double kMostAngle = 0.05, kMostGrowth = 0.05;
+constexpr double kMostAngle = 0.06, kMostGrowth = 0.05;
 // Levels: the most that frames may differ by from the first reference.
 constexpr double kMostNoise = 12;
 // Frames of which so much fits tell the noise.

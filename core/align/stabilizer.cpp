@@ -87,11 +87,12 @@ Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   }
   const Motion motion =
       finder_.find(grey, compose(inverse(offset_), pose_), inverse(offset_), turns_);
+  const Pose pose = motion.pose == inverse(offset_) ? Pose() : compose(offset_, motion.pose);
   const double farthest = kFarthest * std::max(width_, height_);
-  const bool beyond = motion.found && std::hypot(motion.pose.x, motion.pose.y) > farthest;
+  const bool beyond = motion.found && std::hypot(pose.x, pose.y) > farthest;
   if (motion.found && !beyond) {
     lost_ = beyond_ = 0;
-    pose_ = motion.pose == inverse(offset_) ? Pose() : compose(offset_, motion.pose);
+    pose_ = pose;
     if (candidates_ > 0) choose_canvas(grey);
     return applied();
   }

@@ -189,8 +189,10 @@ void resample(const Resampling& task, int first_row, int row_count, ResampleRoom
              low = static_cast<float>(task.from_height - 1);
   // Along a row of the picture, output columns are so many of its samples apart.
   const float step = at.xx - at.xy * at.yx / at.yy;
-  for (int top = first_row; top < first_row + row_count; top += kTileHeight) {
-    const int rows = std::min(kTileHeight, first_row + row_count - top);
+  // The same tiles for any bands: sums of floats are rounded where they begin.
+  for (int top = first_row / kTileHeight * kTileHeight; top < first_row + row_count;
+       top += kTileHeight) {
+    const int rows = std::min(kTileHeight, task.height - top);
     for (int left = 0; left < task.width; left += kTileWidth) {
       const int cols = std::min(kTileWidth, task.width - left);
       const auto y_of = [&](int x, int y) {
@@ -224,7 +226,8 @@ void resample(const Resampling& task, int first_row, int row_count, ResampleRoom
         (padded, x - static_cast<float>(from), step, cols,
          columns + static_cast<size_t>(v - first) * kStride);
       }
-      for (int y = top; y < top + rows; ++y) {
+      const int stop_row = std::min(top + rows, first_row + row_count);
+      for (int y = std::max(top, first_row); y < stop_row; ++y) {
         const float x_start =
             at.x0 + at.xx * static_cast<float>(left) + at.xy * static_cast<float>(y);
         const float y_start = y_of(left, y);

@@ -14,8 +14,8 @@ struct Places {
 
   bool is_shift() const { return xx == 1 && xy == 0 && yx == 0 && yy == 1; }
 };
-// Turns, growth and shears up to this, that is some 3 degrees.
-constexpr float kMostTurn = 0.055f;
+// Turns (xy and yx) and growth (xx and yy, less 1) up to this, that is some 3.5 degrees.
+constexpr float kMostTurn = 0.06f;
 
 // What a thread needs for it.
 class ResampleRoom {

@@ -26,15 +26,20 @@ struct Case {
 constexpr uint8_t kOutside = 99;
 
 // First along rows, at the row's own places, and then along columns.
-double plain(const Case& at, const std::vector<uint8_t>& from, int x, int y, bool* inside) {
+double plain(const Case& at, const std::vector<uint8_t>& from, int x, int y, bool* inside,
+             bool* border) {
   const Places& p = at.places;
   const double u = p.x0 + double{p.xx} * x + double{p.xy} * y;
   const double v = p.y0 + double{p.yx} * x + double{p.yy} * y;
+  // Nobody knows what is next to the border, but for shifts.
+  const double near = p.is_shift() ? 0 : 1e-3;
   *inside = u >= 0 && u <= at.width - 1 && v >= 0 && v <= at.height - 1;
+  *border = std::min({std::abs(u), std::abs(u - at.width + 1), std::abs(v),
+                      std::abs(v - at.height + 1)}) < near;
   double sum = 0;
   for (int row = static_cast<int>(std::floor(v)) - 2; row <= std::floor(v) + 3; ++row) {
     // Where column x meets this row of the picture.
-    const double along = (row - p.y0 - double{p.yx} * x) / p.yy;
+    const double along = (double(row) - double{p.y0} - double{p.yx} * x) / double{p.yy};
     const double at_row = p.x0 + double{p.xx} * x + double{p.xy} * along;
     double of_row = 0;
     for (int col = static_cast<int>(std::floor(at_row)) - 2; col <= std::floor(at_row) + 3; ++col)
@@ -65,8 +70,9 @@ void expect_plain(const Case& at) {
     resample(task, first, std::min(37, at.height - first), &room);
   for (int y = 0; y < at.height; ++y)
     for (int x = 0; x < at.width; ++x) {
-      bool inside;
-      const double expected = plain(at, copy, x, y, &inside);
+      bool inside, border;
+      const double expected = plain(at, copy, x, y, &inside, &border);
+      if (border) continue;
       const double got =
           to[static_cast<size_t>(y) * static_cast<size_t>(at.width) + static_cast<size_t>(x)];
       // Half a level to round, and places in float: 2000 pixels times the epsilon, times a slope of
