@@ -52,7 +52,7 @@ Landmarks::Landmarks(int most)
       residual_(x_.size()) {}
 
 uint64_t Landmarks::bytes(int most) {
-  return static_cast<uint64_t>(most) * (2 * sizeof(int16_t) + 4 * sizeof(float));
+  return static_cast<uint64_t>(most) * (2 * sizeof(int32_t) + 4 * sizeof(float));
 }
 
 void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int ignored_scale) {
@@ -83,8 +83,8 @@ void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int
       if (ignored.has(best_x * ignored_scale, best_y * ignored_scale)) continue;
       const uint8_t* const at = picture.samples + best_y * stride + best_x;
       const auto i = static_cast<size_t>(count_++);
-      x_[i] = static_cast<int16_t>(best_x);
-      y_[i] = static_cast<int16_t>(best_y);
+      x_[i] = static_cast<int32_t>(best_x);
+      y_[i] = static_cast<int32_t>(best_y);
       level_[i] = smoothed(at, stride);
       right_[i] = (smoothed(at + 1, stride) - smoothed(at - 1, stride)) / 2;
       down_[i] = (smoothed(at + stride, stride) - smoothed(at - stride, stride)) / 2;
@@ -106,10 +106,11 @@ void Landmarks::read(const GreyView& frame, const Pose& pose, const GreyLight& l
   const auto xx = static_cast<float>(to_frame.xx), xy = static_cast<float>(to_frame.xy),
              yx = static_cast<float>(to_frame.yx), yy = static_cast<float>(to_frame.yy),
              x0 = static_cast<float>(to_frame.offset.x), y0 = static_cast<float>(to_frame.offset.y);
-  const auto right = static_cast<float>(frame.width - 1),
-             end = static_cast<float>(frame.height - 1);
+  const auto right = static_cast<float>(frame.width - 2),
+             end = static_cast<float>(frame.height - 2);
   for (size_t i = 0; i < count; ++i) {
-    const float x = x0 + xx * x_[i] + xy * y_[i], y = y0 + yx * x_[i] + yy * y_[i];
+    const auto px = static_cast<float>(x_[i]), py = static_cast<float>(y_[i]);
+    const float x = x0 + xx * px + xy * py, y = y0 + yx * px + yy * py;
     if (!(x >= 1 && y >= 1 && x < right && y < end)) {
       residual_[i] = kOutside;
       continue;
@@ -172,7 +173,8 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
     weights += weight;
     likeness += weight * far;
     squares += weight * e * e;
-    const float u = (x_[i] - middle_x) / half, v = (y_[i] - middle_y) / half;
+    const float u = (static_cast<float>(x_[i]) - middle_x) / half,
+                v = (static_cast<float>(y_[i]) - middle_y) / half;
     const float row[kUnknown + 1] = {level_[i] - 128,
                                      1,
                                      right_[i],
