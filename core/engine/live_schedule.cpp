@@ -66,10 +66,19 @@ void LiveSchedule::mend() {
 
 // Publishes what is due.
 void LiveSchedule::settle() {
-  if (piece_due_ && plan_.frames() + 1 < *piece_due_) return;
-  piece_due_.reset();
+  if (piece_ && plan_.frames() + 1 < piece_->due) {
+    wait_for_share();
+    return;
+  }
+  piece_.reset();
   wait();
   publish();
+}
+
+void LiveSchedule::wait_for_share() {
+  const Clock::Span span = waiting();
+  const auto frames = plan_.frames() + 1 - piece_->from, all = piece_->due - piece_->from;
+  side().wait_until(piece_->begun + piece_->took_before * frames / all);
 }
 
 void LiveSchedule::publish() {
@@ -94,7 +103,9 @@ void LiveSchedule::begin_work() {
     if (!step.solve) return;
     background().begin(span);
     build_ = Build{1, 0, first_frame};
-    if (!at_once) piece_due_ = plan_.frames() + step.build_slices;
+    if (!at_once)
+      piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices,
+                     std::chrono::steady_clock::now(), piece_took_};
   } else if (step.group > 0) {
     group_ =
         Group{span, step.group, step.gram_slices, 0, step.solve, step.build_slices, first_frame};
@@ -105,7 +116,11 @@ void LiveSchedule::begin_work() {
 void LiveSchedule::run(bool at_once) {
   wishes_ = background().wishes();
   if (!at_once) {
-    start([this] { work(); });
+    start([this] {
+      const auto begun = std::chrono::steady_clock::now();
+      work();
+      piece_took_ = std::chrono::steady_clock::now() - begun;
+    });
     return;
   }
   while (group_ || build_) work();
@@ -142,7 +157,7 @@ void LiveSchedule::stop() noexcept {
   side().abandon();
   group_.reset();
   build_.reset();
-  piece_due_.reset();
+  piece_.reset();
   finished_.reset();
 }
 

@@ -1,6 +1,7 @@
 // Each frame leaves at once, against the newest model.
 #pragma once
 
+#include <chrono>
 #include <optional>
 
 #include "core/engine/live_plan.h"
@@ -39,6 +40,14 @@ class LiveSchedule : public Schedule {
     int64_t first_frame;
   };
 
+  // A solve in one piece: it goes on beside the frames until the frame before which it must end. So
+  // that this one does not wait for all of it, each waits for its share of what the last one took.
+  struct Piece {
+    int64_t from, due;
+    std::chrono::steady_clock::time_point begun;
+    std::chrono::steady_clock::duration took_before;
+  };
+
   // Of the newest frame.
   struct Moment {
     double time = 0;
@@ -49,6 +58,7 @@ class LiveSchedule : public Schedule {
   void follow_scene();
   void mend();
   void settle();
+  void wait_for_share();
   void begin_work();
   void run(bool at_once);
   void work();
@@ -61,13 +71,14 @@ class LiveSchedule : public Schedule {
   bool start_new_window_ = false;
   Moment published_;         // when the model in use was published
   int64_t model_start_ = 0;  // the frame at time 0 of the model in use, counted like first_frame
+  std::optional<Piece> piece_;
   // The side thread's while it works.
+  std::chrono::steady_clock::duration piece_took_{};  // the last one
   std::optional<Group> group_;
   std::optional<Build> build_;
-  std::optional<int64_t> piece_due_;  // the frame before which a solve in one piece must end
-  std::optional<int64_t> finished_;   // first frame of a solve that waits to be published
-  MaskWishes wishes_;                 // as they were when the work began
-  std::optional<Learnt> left_;        // of the scene that the camera showed before
+  std::optional<int64_t> finished_;  // first frame of a solve that waits to be published
+  MaskWishes wishes_;                // as they were when the work began
+  std::optional<Learnt> left_;       // of the scene that the camera showed before
 };
 
 }  // namespace qdmd

@@ -96,10 +96,11 @@ class Schedule {
   }
   // For the side thread's work, whose time it charges itself. Throws what that threw.
   void wait() {
-    const Clock::Span span(*stage_.clock, Clock::waiting);
+    const Clock::Span span = waiting();
     if (!side().idle()) hold_up();
     side().finish();
   }
+  Clock::Span waiting() const { return Clock::Span(*stage_.clock, Clock::waiting); }
   // With the newest frame, which is taken in.
   SceneSeen scene_seen() {
     if (!background().known() || background().state() == Background::State::held)

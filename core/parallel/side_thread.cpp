@@ -84,6 +84,12 @@ void SideThread::wait() {
   changed_.wait(lock, [this] { return !busy_; });
 }
 
+void SideThread::wait_until(std::chrono::steady_clock::time_point then) {
+  if (!thread_.joinable()) return;
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, then, [this] { return !busy_; });
+}
+
 void SideThread::abandon() noexcept {
   wait();
   error_ = nullptr;

@@ -1,6 +1,7 @@
 // One piece of work that goes on while its caller does something else.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <functional>
@@ -30,6 +31,8 @@ class SideThread {
   void abandon() noexcept;
   // The same, and keeps what it threw for finish().
   void rest() noexcept { wait(); }
+  // Waits until what start() began is done, or until then.
+  void wait_until(std::chrono::steady_clock::time_point then);
   // True where nothing runs.
   bool idle();
 

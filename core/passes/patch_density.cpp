@@ -152,8 +152,9 @@ PatchFrames::PatchFrames(const Grid& grid, const GridFrames& frames, int count, 
   size_t cell = 0;
   for (int row = 0; row < grid.rows; ++row)
     for (int col = 0; col < grid.cols; ++col, ++cell)
-      limit_[cell] = static_cast<uint16_t>(kChannels * kSimilar * kStepsPerLevel *
-                                           static_cast<float>(patch_cells(grid, row, col)));
+      limit_[cell] =
+          static_cast<uint16_t>(kChannels * kSimilar * kStepsPerLevel *
+                                static_cast<float>(patch_cells(grid, row, col, kPatchRadius)));
 }
 
 uint64_t PatchFrames::bytes(const Grid& grid, uint64_t count) {
@@ -223,7 +224,7 @@ void patch_distance(const Grid& grid, const GridFrames& frames, int count, const
   });
   pool->run(rows, [&](size_t row, size_t worker) {
     uint16_t* sum = sums.data() + worker * stride;
-    constexpr size_t kReach = kPatchRadius;
+    constexpr size_t kReach = kNearRadius;
     for (size_t col = 0; col < cols; ++col) {
       const size_t cell = row * cols + col;
       HWY_DYNAMIC_DISPATCH(add_patch)

@@ -8,7 +8,9 @@
 
 namespace qdmd {
 
-constexpr int kPatchRadius = 2;  // cells: patches of 5 x 5
+// Cells. Looks are compared by patches of 5 x 5, so that what is alike by chance does not count;
+// and by 3 x 3 where the look is known, and what is beside it may be hidden.
+constexpr int kPatchRadius = 2, kNearRadius = 1;
 constexpr float kSimilar =
     5;  // levels a channel: the distance at which patches are no longer alike
 constexpr float kMostDistance = 40;  // levels a channel: a cell counts at most this
@@ -20,11 +22,11 @@ constexpr int kStepsPerLevel = 16;
   const float steps = level * kStepsPerLevel + 0.5f;
   return static_cast<uint16_t>(static_cast<int>(steps < 65535.0f ? steps : 65535.0f));
 }
-// The cells of the patch around a cell; at the border they are fewer.
-inline int patch_cells(const Grid& grid, int row, int col) {
-  const auto along = [](int at, int length) {
-    return (at + kPatchRadius < length ? at + kPatchRadius : length - 1) -
-           (at > kPatchRadius ? at - kPatchRadius : 0) + 1;
+// The cells of the patch around a cell that patch_distance() compares; at the border they are
+// fewer.
+inline int patch_cells(const Grid& grid, int row, int col, int radius = kNearRadius) {
+  const auto along = [radius](int at, int length) {
+    return (at + radius < length ? at + radius : length - 1) - (at > radius ? at - radius : 0) + 1;
   };
   return along(row, grid.rows) * along(col, grid.cols);
 }
@@ -57,7 +59,7 @@ class PatchFrames {
 
 // distance[cell * count + t]: the steps that the patches around the cell in frame t and in frame
 // reference[cell] differ by, all channels together: d times kChannels * kStepsPerLevel *
-// patch_cells().
+// patch_cells(), of patches of 3 x 3.
 void patch_distance(const Grid& grid, const GridFrames& frames, int count, const int* reference,
                     Pool* pool, uint16_t* distance);
 // The memory that it takes, with the result.

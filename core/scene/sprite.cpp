@@ -116,6 +116,22 @@ Sprite draw_bag(int height, const Colour& leather) {
   return rasterize(static_cast<int>(std::lround(1.2 * height)), height, leather, paint);
 }
 
+Sprite draw_leaf(double length, double angle, const Colour& green) {
+  constexpr double kWidth = 0.42;  // over the length
+  const double cosine = std::cos(angle), sine = std::sin(angle);
+  const auto paint = [&](double u, double v) -> std::optional<Colour> {
+    // Along the leaf, -1 .. 1, and across it.
+    const double along = 2 * ((u - 0.5) * cosine + (v - 0.5) * sine);
+    const double across = 2 * ((v - 0.5) * cosine - (u - 0.5) * sine) / kWidth;
+    if (std::abs(along) > 1 || std::abs(across) > 1 - along * along) return std::nullopt;
+    const double rib = std::abs(across) < 0.08 ? 1.25 : 1;
+    const double side_ribs = 1 + 0.12 * std::sin(14 * (along - 0.6 * std::abs(across)));
+    return shaded(green, (1 + 0.25 * across + 0.15 * along) * rib * side_ribs);
+  };
+  const int side = std::max(1, static_cast<int>(std::lround(length)));
+  return rasterize(side, side, green, paint);
+}
+
 Sprite mirrored(const Sprite& sprite) {
   Sprite result;
   result.picture = Picture(sprite.width(), sprite.height());

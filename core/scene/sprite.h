@@ -34,6 +34,8 @@ Sprite draw_van(int width, int height, const Colour& paint);
 Sprite draw_lorry(int width, int height, const Colour& paint);
 // A bag that somebody may leave.
 Sprite draw_bag(int height, const Colour& leather);
+// A leaf near the camera: `length` pixels from stalk to tip, turned by `angle` radians, with ribs.
+Sprite draw_leaf(double length, double angle, const Colour& green);
 // The same figure facing the other way.
 Sprite mirrored(const Sprite& sprite);
 // Moves every opaque pixel so that the mean is `mean`, with the texture at `contrast` of itself.

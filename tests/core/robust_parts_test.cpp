@@ -44,9 +44,10 @@ GridFrames related_frames(const Grid& grid, int count, std::mt19937& rng) {
 struct PatchSum {
   int sum = 0, cells = 0;
 
-  PatchSum(const Grid& grid, const GridFrames& frames, int s, int t, int y, int x) {
-    for (int yy = y - kPatchRadius; yy <= y + kPatchRadius; ++yy)
-      for (int xx = x - kPatchRadius; xx <= x + kPatchRadius; ++xx) {
+  PatchSum(const Grid& grid, const GridFrames& frames, int s, int t, int y, int x,
+           int radius = kPatchRadius) {
+    for (int yy = y - radius; yy <= y + radius; ++yy)
+      for (int xx = x - radius; xx <= x + radius; ++xx) {
         if (yy < 0 || yy >= grid.rows || xx < 0 || xx >= grid.cols) continue;
         const auto i = static_cast<size_t>(yy * grid.cols + xx);
         int d = 0;
@@ -206,7 +207,7 @@ TEST(Patches, DistanceIsThatOfTheDoubleLoop) {
         for (int cell = 0; cell < rows * cols; ++cell)
           for (int t = 0; t < count; ++t) {
             const int other = reference[static_cast<size_t>(cell)];
-            const PatchSum patch(grid, frames, t, other, cell / cols, cell % cols);
+            const PatchSum patch(grid, frames, t, other, cell / cols, cell % cols, kNearRadius);
             ASSERT_EQ(distance[static_cast<size_t>(cell * count + t)], patch.sum);
             ASSERT_EQ(patch_cells(grid, cell / cols, cell % cols), patch.cells);
           }

@@ -192,13 +192,12 @@ TEST(SceneIndependence, OnlyEffectsThatNeedAWarpEnlargeTheCanvas) {
 }
 
 // At these values an effect does nothing at all; one that enlarges the canvas stands apart.
-constexpr const char* kNothing[] = {"low-rate=4",     "stop=0",          "abandon:seconds=0",
-                                    "clutter=0",      "leaves=0",        "trees=0",
-                                    "flicker=0",      "shadow:length=0", "mirror=0",
-                                    "motion-blur=0",  "rain=0",          "rain:brightness=0",
-                                    "snow=0",         "defocus=0",       "fade=0",
-                                    "light-switch=0", "bands=0",         "exposure=0",
-                                    "noise=0",        "length=1000"};
+constexpr const char* kNothing[] = {
+    "low-rate=4",    "stop=0",         "abandon:seconds=0", "clutter=0",       "foliage=0",
+    "leaves=0",      "trees=0",        "flicker=0",         "shadow:length=0", "mirror=0",
+    "motion-blur=0", "rain=0",         "rain:brightness=0", "snow=0",          "defocus=0",
+    "fade=0",        "light-switch=0", "bands=0",           "exposure=0",      "noise=0",
+    "length=1000"};
 
 void expect_no_change(const std::string& nothing, const std::string& name) {
   // Two effects of one name are one.

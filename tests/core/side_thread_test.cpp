@@ -35,6 +35,24 @@ TEST(SideThread, WorkRunsBesideItsCaller) {
   EXPECT_NE(worker, std::thread::id());
 }
 
+TEST(SideThread, WaitsNoLongerThanItIsTold) {
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  SideThread side(true);
+  std::promise<void> go;
+  side.start([wait = go.get_future().share()] { wait.wait(); });
+  const auto then = now() + 5ms;
+  side.wait_until(then);
+  EXPECT_GE(now(), then);
+  EXPECT_FALSE(side.idle());
+  side.wait_until(now() - 1s);
+  go.set_value();
+  // Long before the hour is over.
+  side.wait_until(now() + 1h);
+  EXPECT_TRUE(side.idle());
+  side.wait_until(now() + 1h);
+  side.finish();
+}
+
 TEST(SideThread, InactiveDoesTheWorkAtOnce) {
   SideThread side(false);
   bool done = false;

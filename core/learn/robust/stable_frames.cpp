@@ -18,9 +18,9 @@ constexpr float kLeastSeen = 0.15f;
 constexpr int kProposals = 64;
 
 // A frame shows the background where its patch is as near to the background's as kNear times the
-// nearest tenth, or as half the distance at which patches are alike.
+// nearest twentieth, or as half the distance at which patches are alike.
 constexpr float kNear = 3;
-constexpr double kNearest = 0.08;
+constexpr double kNearest = 0.05;
 
 // The picture that takes each cell from the frame `from`.
 class GridPicture {

@@ -6,8 +6,8 @@
 namespace qdmd::scene {
 
 extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kClutter,
-    kBootstrap, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror, kMotionBlur, kRain, kSnow,
-    kDefocus, kJitter, kFade, kLightSwitch, kNight, kBands, kExposure, kNoise, kCompression;
+    kBootstrap, kFoliage, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror, kMotionBlur, kRain,
+    kSnow, kDefocus, kJitter, kFade, kLightSwitch, kNight, kBands, kExposure, kNoise, kCompression;
 
 // For EffectInfo::make.
 template <typename Class>
