@@ -34,8 +34,8 @@ void Restorer::restore_level(const Pose& pose, const uint8_t* const frame[3], Re
   }
 }
 
-const uint8_t* Restorer::restore(const Pose& pose, const uint8_t* mask, bool hard,
-                                 Resampler* resampler, Pool* pool, std::vector<uint8_t>* out) {
+uint8_t* Restorer::restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
+                           Pool* pool, std::vector<uint8_t>* out) {
   resampler->prepare(pool);
   std::fill(out->begin(), out->end(), uint8_t{0});
   resampler->run(mask, affine(pose, middle_of(width_, height_)), out->data(), width_, height_,

@@ -27,19 +27,19 @@ class Restorer {
   const uint8_t* level(int channel) const { return level_[static_cast<size_t>(channel)].data(); }
 
   // A mask on the canvas, of 255 and 0 where it is hard, seen from `pose`.
-  const uint8_t* restore_mask(const Pose& pose, const uint8_t* mask, bool hard,
-                              Resampler* resampler, Pool* pool) {
+  uint8_t* restore_mask(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
+                        Pool* pool) {
     return restore(pose, mask, hard, resampler, pool, &mask_);
   }
   // The same of a second one.
-  const uint8_t* restore_shaded(const Pose& pose, const uint8_t* shaded, Resampler* resampler,
-                                Pool* pool) {
+  uint8_t* restore_shaded(const Pose& pose, const uint8_t* shaded, Resampler* resampler,
+                          Pool* pool) {
     return restore(pose, shaded, true, resampler, pool, &shaded_);
   }
 
  private:
-  const uint8_t* restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
-                         Pool* pool, std::vector<uint8_t>* out);
+  uint8_t* restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
+                   Pool* pool, std::vector<uint8_t>* out);
 
   int width_, height_;
   std::vector<uint8_t> canvas_[kChannels], level_[kChannels], mask_, shaded_;

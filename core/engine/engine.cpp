@@ -232,9 +232,15 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
     restorer_->restore_level(pose, task->x, resampler, pool);
     for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
   }
+  // What is ignored has its place in the frame.
+  const auto ignore = [&](uint8_t* mask) {
+    ignored_.clear_rows(0, frames_.height(), frames_.width(), mask);
+    return mask;
+  };
   if (task->mask)
-    task->mask = restorer_->restore_mask(pose, task->mask, !task->soft, resampler, pool);
-  if (task->shaded) task->shaded = restorer_->restore_shaded(pose, task->shaded, resampler, pool);
+    task->mask = ignore(restorer_->restore_mask(pose, task->mask, !task->soft, resampler, pool));
+  if (task->shaded)
+    task->shaded = ignore(restorer_->restore_shaded(pose, task->shaded, resampler, pool));
 }
 
 void Engine::foreground(uint8_t* mask, uint8_t* residual) {

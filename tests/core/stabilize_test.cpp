@@ -249,6 +249,30 @@ TEST(Stabilize, TakesAnySizeAndAnyFrame) {
   }
 }
 
+// Rectangles have their place in the frame, wherever its camera looks.
+TEST(Stabilize, WhatIsIgnoredStaysWhereItIs) {
+  const Film shaken = film("basic,bootstrap,jitter=3", 60);
+  Engine engine;
+  ASSERT_TRUE(engine.configure(robust(Stabilize::translation), kWidth, kHeight).ok());
+  IgnoredAreas areas;
+  areas.add({40, 50, 60, 50});
+  engine.set_ignored(areas);
+  std::vector<uint8_t> out(shaken.frames[0].size());
+  int inside = 0, outside = 0;
+  for (const auto& frame : shaken.frames) {
+    ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight)).ok());
+    while (engine.ready()) {
+      engine.pop(Output::mask, view_of(out.data(), kWidth, kHeight));
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x)
+          if (out[static_cast<size_t>(3 * (y * kWidth + x))] > 0)
+            ++(areas.has(x, y) ? inside : outside);
+    }
+  }
+  EXPECT_EQ(inside, 0);
+  EXPECT_GT(outside, 0);
+}
+
 // A flush and a new size forget the camera.
 TEST(Stabilize, AfterAFlushTheNextFrameIsTheCanvas) {
   const Film shaken = film("basic,jitter=3", 50);
