@@ -1,6 +1,7 @@
 #include "core/align/landmarks.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -89,6 +90,15 @@ void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int
       right_[i] = (smoothed(at + 1, stride) - smoothed(at - 1, stride)) / 2;
       down_[i] = (smoothed(at + stride, stride) - smoothed(at - stride, stride)) / 2;
     }
+}
+
+int Landmarks::parts() const {
+  constexpr int kAlong = 4, kSome = 2;
+  std::array<int, kAlong * kAlong> found{};
+  for (size_t i = 0; i < static_cast<size_t>(count_); ++i)
+    ++found[static_cast<size_t>(kAlong * (kAlong * y_[i] / height_) + kAlong * x_[i] / width_)];
+  return static_cast<int>(
+      std::count_if(found.begin(), found.end(), [](int some) { return some >= kSome; }));
 }
 
 // Residuals of a frame at a pose.

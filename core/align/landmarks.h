@@ -43,6 +43,9 @@ class Landmarks {
   // Those of `picture`, in place of the old ones; none where `ignored` is.
   void choose(const GreyView& picture, const IgnoredAreas& ignored, int ignored_scale);
   int count() const { return count_; }
+  // How many of 4 x 4 parts of the picture have some. Those of one thing before a bare wall are in
+  // a few, and move with it.
+  int parts() const;
   // Landmarks that are needed to say anything.
   static constexpr int kFewest = 12;
 

@@ -9,6 +9,8 @@ namespace {
 constexpr int kLandmarks = 1024, kLandmarksAbove = 512;
 // Pixels along the short side of the pyramid's top, at least.
 constexpr int kTop = 20;
+// Of 4 x 4 parts of the picture, so many must have landmarks.
+constexpr int kFewestParts = 7;
 // Pixels below which the camera is at rest.
 constexpr double kRest = 0.1;
 // Standard deviations by which a shift must be known.
@@ -89,6 +91,8 @@ void MotionFinder::take_reference(const uint8_t* grey, const IgnoredAreas& ignor
   build(grey);
   for (size_t k = 0; k < levels_.size(); ++k)
     levels_[k].marks.choose(view(k, grey), ignored, 1 << k);
+  const Landmarks& marks = levels_[0].marks;
+  blank_ = marks.count() < Landmarks::kFewest || marks.parts() < kFewestParts;
   light_ = {};
   known_ = true;
 }
@@ -175,7 +179,7 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   Landmarks& marks = levels_[0].marks;
   const Fit look = marks.step(view(0, grey), rest, light_, turns);
   // A picture without edges shows no motion.
-  if (!look.known) {
+  if (blank_ || !look.known) {
     motion.pose = rest;
     motion.found = true;
     return motion;

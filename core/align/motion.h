@@ -30,8 +30,8 @@ class MotionFinder {
   void take_reference(const uint8_t* grey, const IgnoredAreas& ignored);
   bool known() const { return known_; }
   void forget();
-  // Nothing in the reference tells where it is.
-  bool is_blank() const { return levels_[0].marks.count() < Landmarks::kFewest; }
+  // Too little in the reference tells where it is: nothing moves then.
+  bool is_blank() const { return blank_; }
 
   // Of a frame, which comes after one that was at `before`; it is looked for at `rest` first.
   // turns: angle and scale are free.
@@ -51,7 +51,7 @@ class MotionFinder {
   Fit refine(size_t level, const uint8_t* grey, Pose pose, bool turns, int steps, double enough);
 
   std::vector<Level> levels_;
-  bool known_ = false;
+  bool known_ = false, blank_ = false;
   GreyLight light_;   // of the newest frame that was found
   double noise_ = 0;  // levels, of frames that were found; 0: of none yet
 };

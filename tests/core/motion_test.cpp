@@ -146,6 +146,25 @@ TEST(Motion, IsNotThatOfABusBeforeTheCamera) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.2);
 }
 
+// A box that walks along a bare wall is all that has edges.
+TEST(Motion, IsNotThatOfAllThereIsToSee) {
+  const auto wall = [](int t) {
+    std::vector<uint8_t> grey(size_t{kWidth} * kHeight);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const int left = 100 + 2 * t;
+        const bool box = x >= left && x < left + 60 && y >= 80 && y < 160;
+        grey[static_cast<size_t>(y * kWidth + x)] =
+            static_cast<uint8_t>(box ? 30 + 90 * ((x - left) / 6 % 2) : 100 + x / 4);
+      }
+    return grey;
+  };
+  MotionFinder finder(kWidth, kHeight);
+  finder.take_reference(wall(0).data(), {});
+  for (int t = 0; t < 12; ++t)
+    EXPECT_TRUE(finder.find(wall(t).data(), {}, {}, false).pose.is_rest()) << t;
+}
+
 TEST(Motion, OfAnythingIsSomething) {
   std::mt19937 rng(3);
   for (const auto& [width, height] :
