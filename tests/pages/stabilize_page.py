@@ -111,7 +111,7 @@ def measure_motion(scene, stabilize):
     way = numpy.sort(numpy.hypot(error[:, 0], error[:, 1]))
     angle = numpy.sort(numpy.abs(error[:, 2]))
     at = int(0.95 * len(way))
-    return [f'`{scene}`', len(way), f'{numpy.median(way):.3f}', f'{way[at]:.3f}', f'{numpy.mean(way < 0.1):.3f}',
+    return [f'`{scene}`', str(len(way)), f'{numpy.median(way):.3f}', f'{way[at]:.3f}', f'{numpy.mean(way < 0.1):.3f}',
             f'{angle[at]:.3f}' if stabilize == 'similarity' else '']
 
 
