@@ -338,6 +338,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       g_param_spec_boxed("stats", "Statistics",
                          "Counters, and facts about the newest solve: rank, lambda (real and "
                          "imaginary part), omega in rad/frame, residual, condition, "
+                         "rounding-bound and sensitivity in levels, solver (that gave the result), "
                          "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
                          "what it was given: sample-step, iterations, solve-period (of so many "
                          "windows or hops one is solved); time-per-frame (ms), as learnt",
@@ -419,6 +420,6 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
        {gst_qdmd_background_output_get_type(), gst_qdmd_background_mode_get_type(),
         gst_qdmd_background_method_get_type(), gst_qdmd_background_amplitude_get_type(),
         gst_qdmd_background_solver_get_type(), gst_qdmd_background_shadows_get_type(),
-        gst_qdmd_background_stabilize_get_type()})
+        gst_qdmd_background_stabilize_get_type(), gst_qdmd_background_estimator_get_type()})
     gst_type_mark_as_plugin_api(type, GstPluginAPIFlags(0));
 }

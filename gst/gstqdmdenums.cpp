@@ -92,6 +92,8 @@ GType gst_qdmd_background_amplitude_get_type() {
 
 GType gst_qdmd_background_solver_get_type() {
   static const GEnumValue values[] = {
+      {int(qdmd::Solver::automatic),
+       "gram, and gram-extended where gram may be off by a quarter of a level", "auto"},
       {int(qdmd::Solver::gram), "From the exact integer Gram matrix of the window (fast)", "gram"},
       {int(qdmd::Solver::gram_extended),
        "The Gram matrix factorized in double-double: for nearly dependent frames", "gram-extended"},
@@ -101,5 +103,18 @@ GType gst_qdmd_background_solver_get_type() {
        "The paper's procedure, literally, on the pixels (slow, small windows only)", "adjoint"},
       {0, nullptr, nullptr}};
   static const GType type = g_enum_register_static("GstQdmdBackgroundSolver", values);
+  return type;
+}
+
+GType gst_qdmd_background_estimator_get_type() {
+  static const GEnumValue values[] = {
+      {int(qdmd::Estimator::exact), "The paper's: noise shrinks abs(lambda)", "exact"},
+      {int(qdmd::Estimator::forward_backward),
+       "The geometric mean of the operators of time and of time turned back", "forward-backward"},
+      {int(qdmd::Estimator::total), "Total least squares: noise in both frames of a pair", "total"},
+      {int(qdmd::Estimator::optimized),
+       "The background's exponentials, fitted to all frames at once", "optimized"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundEstimator", values);
   return type;
 }

@@ -13,6 +13,7 @@ GType gst_qdmd_background_stabilize_get_type();
 GType gst_qdmd_background_method_get_type();
 GType gst_qdmd_background_amplitude_get_type();
 GType gst_qdmd_background_solver_get_type();
+GType gst_qdmd_background_estimator_get_type();
 GType gst_qdmd_background_mode_get_type();
 
 namespace qdmd {

@@ -96,11 +96,28 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum(
            "solver", "Solver",
-           "How the decomposition of method=qdmd and robust is computed; same picture, other cost "
-           "(not used by method=dmd)",
+           "How the decomposition of method=qdmd and robust is computed; same picture, other cost: "
+           "one that gets nowhere hands on to a more careful one (not used by method=dmd)",
            gst_qdmd_background_solver_get_type(), gint(d.engine.dmd.solver), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.solver)},
+    {[](const Settings& d) {
+       return g_param_spec_enum(
+           "estimator", "Estimator",
+           "How eigenvalues are estimated from frames with noise, for method=qdmd and robust; "
+           "forward-backward and total take rank=0 for 1, since at full rank they change nothing "
+           "(not used by method=dmd)",
+           gst_qdmd_background_estimator_get_type(), gint(d.engine.dmd.estimator), kAtStart);
+     },
+     QDMD_ENUM(s.engine.dmd.estimator)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean(
+           "spectrum", "Spectrum",
+           "Messages and stats have all eigenvalues of a solve, their amplitudes and which are "
+           "background; costs a decomposition with all modes (not used by method=dmd)",
+           d.engine.dmd.spectrum, kAtStart);
+     },
+     QDMD_BOOLEAN(s.engine.dmd.spectrum)},
     {[](const Settings& d) {
        return g_param_spec_uint("sample-step", "Sample step",
                                 "The decomposition sees every k-th pixel in x and y; the output "

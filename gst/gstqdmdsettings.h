@@ -31,7 +31,7 @@ struct Settings {
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 27;
+inline constexpr guint kFirstFreeProperty = 29;
 static_assert(kFirstFreeProperty <= 32, "Settings::asked has a bit for each");
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.

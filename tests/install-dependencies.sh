@@ -2,7 +2,7 @@
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
-#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs
+#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -21,6 +21,8 @@ demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x)
 # Plots of docs/performance.md.
 docs=(python3 python3-matplotlib)
+# What tests/pages/stream.sh compares with.
+opencv=(python3-numpy python3-opencv)
 
 wanted=()
 for group in "$@"; do
@@ -30,7 +32,8 @@ for group in "$@"; do
     package) wanted+=("${package[@]}") ;;
     demo) wanted+=("${demo[@]}") ;;
     docs) wanted+=("${docs[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs)" >&2; exit 2 ;;
+    opencv) wanted+=("${opencv[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv)" >&2; exit 2 ;;
   esac
 done
 

@@ -9,18 +9,6 @@
 namespace qdmd {
 namespace {
 
-QuaternionMatrixd pixels_of(const SnapshotRange& snapshots) {
-  const auto n = static_cast<Eigen::Index>(snapshots.pixels());
-  QuaternionMatrixd x(n, snapshots.size());
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* r = snapshots.plane(t, 0);
-    const uint8_t* g = snapshots.plane(t, 1);
-    const uint8_t* b = snapshots.plane(t, 2);
-    for (Eigen::Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
-  }
-  return x;
-}
-
 Decomposition single_snapshot() {
   Decomposition result;
   result.background = TemporalModel(1);
@@ -34,23 +22,6 @@ Decomposition single_snapshot() {
 }
 
 }  // namespace
-
-BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
-                                 const DmdOptions& options) {
-  if (options.solver == Solver::qr || options.solver == Solver::adjoint) gram.resize(0, 0);
-  switch (options.solver) {
-    case Solver::qr:
-      return qdmd_from_qr(snapshots, options);
-    case Solver::adjoint:
-      return qdmd_from_adjoint(pixels_of(snapshots), options);
-    case Solver::gram:
-    case Solver::gram_extended:
-      break;
-  }
-  QuaternionMatrixd g = quaternion_gram(gram);
-  gram.resize(0, 0);
-  return qdmd_from_gram(std::move(g), options);
-}
 
 Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
                         const DmdOptions& options) {
@@ -109,15 +80,19 @@ namespace {
 
 // How many m x m matrices are alive at once where most are, the snapshot factor R included.
 double most_matrices(const DmdOptions& options) {
-  const bool extended = options.solver == Solver::gram_extended;
+  // Beside a solve: the Gram matrix, and what is moved to see how sure it is.
+  constexpr double kSure = 2;
+  if (options.spectrum) return 14 + kSure;
   // The amplitudes of all modes at once, by Eigen on the complex adjoint.
-  if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14;
+  if (options.omega_threshold > 0 && options.amplitude == Amplitude::first_frame) return 14 + kSure;
   // Singular values: from a Hermitian matrix's eigenvectors, or without squaring.
-  if (options.rank > 0) return options.solver == Solver::gram ? 8 : 10.7;
-  // G and its factor in double-double; the right-hand side of first_frame beside the pencil.
-  if (extended || options.amplitude == Amplitude::first_frame) return 8;
+  if (options.rank > 0) return (options.solver == Solver::gram ? 8 : 10.7) + kSure;
+  // The right-hand side of first_frame beside the pencil.
+  if (options.amplitude == Amplitude::first_frame) return 8 + kSure;
   // R, the pencil H and R11 twice, H - R11 twice.
-  return 7;
+  // Derivatives tell how sure the paper's estimate is, without matrices that are moved.
+  const bool told = options.estimator == Estimator::exact;
+  return told && options.solver != Solver::gram_extended ? 8 : 7 + kSure;
 }
 
 }  // namespace
@@ -128,14 +103,16 @@ uint64_t decomposition_bytes(const DmdOptions& options, double pixels, int snaps
   constexpr double kSpace = 8 << 10;
   const double reduced = most_matrices(options) * matrix + kSpace;
   switch (options.solver) {
+    case Solver::automatic:
     case Solver::gram:
     case Solver::gram_extended:
       break;
     case Solver::qr: {
-      // A block of rows below R, as many reflectors less their triangle, and R of the block.
+      // A block of rows below R, as many reflectors less their triangle, R of the block, and the
+      // Gram matrix, by which the bound goes.
       const double rows = std::max(512.0, 2 * m) + m;
       return static_cast<uint64_t>(
-          std::max(2 * sizeof(Quaterniond) * rows * m + 1.5 * matrix, reduced));
+          std::max(2 * sizeof(Quaterniond) * rows * m + 2.15 * matrix, reduced));
     }
     case Solver::adjoint:
       return static_cast<uint64_t>(adjoint_bytes(pixels, m));

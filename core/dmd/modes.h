@@ -15,6 +15,20 @@ namespace qdmd {
 template <typename Real>
 using ComplexVector = Eigen::Matrix<std::complex<Real>, Eigen::Dynamic, 1>;
 
+// How clear it was which modes are background.
+struct Selection {
+  // How much nearer to the origin, in rad/frame, the chosen modes are than the next one, or than
+  // the threshold; infinite where there is no other.
+  double margin = std::numeric_limits<double>::infinity();
+  // False: a bound from below, since not all modes were computed.
+  bool exact = true;
+  // Modes depend on each other to within rounding: a tolerance decided how they share what they
+  // have in common.
+  bool dependent = false;
+  // |Q~| where the modes are those of a projected operator, whose rounding has its size; else one.
+  double operator_size = 1;
+};
+
 // The background part of a quaternion decomposition of m snapshots, P modes:
 // L(t) = sum_p X combination_p lambda_p^(t - reference_time_p) amplitude_p, X = [x_1 .. x_m].
 template <typename Real>
@@ -23,6 +37,7 @@ struct QuaternionModes {
   QuaternionMatrix<Real> combination;  // m x P
   QuaternionMatrix<Real> amplitudes;   // P x 1
   Eigen::VectorXd reference_times;     // P, frames
+  Selection selection;
   DmdSummary summary;
 
   QuaternionModes() = default;
@@ -48,7 +63,8 @@ Real omega_magnitude(const std::complex<Real>& lambda) {
 // distances keep their order. Empty only for no eigenvalues.
 template <typename Real>
 std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalues,
-                                            double threshold, int limit = 0) {
+                                            double threshold, int limit = 0,
+                                            Selection* selection = nullptr) {
   std::vector<Real> omega(static_cast<size_t>(eigenvalues.size()));
   for (size_t k = 0; k < omega.size(); ++k)
     omega[k] = omega_magnitude(eigenvalues(static_cast<Eigen::Index>(k)));
@@ -64,7 +80,26 @@ std::vector<Eigen::Index> select_background(const ComplexVector<Real>& eigenvalu
   while (threshold > 0 && count < order.size() && omega_of(order[count]) <= Real(threshold))
     ++count;
   if (limit > 0) count = std::min(count, static_cast<size_t>(limit));
-  order.resize(std::min(order.size(), std::max<size_t>(count, 1)));
+  count = std::min(order.size(), std::max<size_t>(count, 1));
+  if (selection) {
+    *selection = {};
+    const auto distance = [&](size_t k) { return static_cast<double>(omega_of(order[k])); };
+    // Several infinite ones are as far as one another.
+    const auto less = [](double from, double by) { return by < from ? from - by : 0.0; };
+    if (count < order.size()) selection->margin = less(distance(count), distance(count - 1));
+    // The threshold decided, and not the limit.
+    if (threshold > 0 && count > 0 && distance(count - 1) <= threshold) {
+      const bool limited = limit > 0 && count == static_cast<size_t>(limit);
+      const double inside = threshold - distance(count - 1);
+      const double outside = count < order.size() && !limited
+                                 ? distance(count) - threshold
+                                 : std::numeric_limits<double>::infinity();
+      selection->margin = limited ? selection->margin : std::min(inside, outside);
+    } else if (threshold > 0 && count > 0) {
+      selection->margin = std::min(selection->margin, distance(0) - threshold);
+    }
+  }
+  order.resize(count);
   return order;
 }
 
@@ -96,12 +131,13 @@ void scale_rows(QuaternionMatrix<Real>& m, const Scale& scale) {
 
 // Amplitudes b (P x 1) that minimize sum_t |x_t - sum_p phi_p lambda_p^(t - reference_p) b_p|^2.
 // phi_phi = Phi^H Phi (P x P), phi_x = Phi^H [x_1 .. x_m] (P x m). Dependent modes share the
-// minimum-norm solution.
+// minimum-norm solution, and `dependent` is set.
 template <typename Real>
 QuaternionMatrix<Real> fit_window_amplitudes(const ComplexVector<Real>& eigenvalues,
                                              const Eigen::VectorXd& reference_times,
                                              const QuaternionMatrix<Real>& phi_phi,
-                                             const QuaternionMatrix<Real>& phi_x) {
+                                             const QuaternionMatrix<Real>& phi_x,
+                                             bool* dependent = nullptr) {
   using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   using ComplexMatrix = typename QuaternionMatrix<Real>::ComplexMatrix;
   using std::sqrt;
@@ -135,6 +171,10 @@ QuaternionMatrix<Real> fit_window_amplitudes(const ComplexVector<Real>& eigenval
   const Real tolerance = gram_tolerance<Real>(modes) * eigen.values(0);
   const Vector inverse = eigen.values.unaryExpr(
       [&](const Real& v) { return v > tolerance && v > Real(0) ? Real(Real(1) / v) : Real(0); });
+  // Normal equations square how dependent modes are: half of the digits is what they may cost.
+  if (dependent)
+    *dependent = modes > 1 && !(eigen.values(modes - 1) >
+                                sqrt(std::numeric_limits<Real>::epsilon()) * eigen.values(0));
   QuaternionMatrix<Real> b =
       eigen.vectors.scale_cols(inverse) * (eigen.vectors.conjugate_transpose() * rhs);
   internal::scale_rows(b, scale);
@@ -149,16 +189,19 @@ void fit_to_window(QuaternionModes<Real>* modes, const QuaternionMatrix<Real>& p
   for (Eigen::Index p = 0; p < modes->eigenvalues.size(); ++p)
     modes->reference_times(p) = fit_reference_time(modes->eigenvalues(p), x.cols());
   const auto phi_h = phi.conjugate_transpose();
-  modes->amplitudes = fit_window_amplitudes<Real>(modes->eigenvalues, modes->reference_times,
-                                                  phi_h * phi, phi_h * x);
+  modes->amplitudes =
+      fit_window_amplitudes<Real>(modes->eigenvalues, modes->reference_times, phi_h * phi,
+                                  phi_h * x, &modes->selection.dependent);
 }
 
 // The b (r x 1) that minimizes |M b - x|, the one of least norm among equals: QR factorization with
 // column pivoting of the complex adjoint, columns scaled to norm one. M: k x r, x: k x 1. With the
 // modes Phi for M and the first snapshot for x these are the paper's amplitudes Phi^+ x_1.
+// `dependent` is set where rounding may have decided what is dependent.
 template <typename Real>
 QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,
-                                     const QuaternionMatrix<Real>& x) {
+                                     const QuaternionMatrix<Real>& x, bool* dependent = nullptr) {
+  using std::sqrt;
   // Unit columns first, so that small modes are not taken for dependent ones.
   Eigen::Matrix<Real, Eigen::Dynamic, 1> scale(m.cols());
   for (Eigen::Index p = 0; p < m.cols(); ++p) {
@@ -168,8 +211,15 @@ QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,
   const auto chi = m.scale_cols(scale).adjoint();
   typename QuaternionMatrix<Real>::ComplexMatrix rhs(2 * x.rows(), 1);
   rhs << x.a, -x.b.conjugate();
-  const typename QuaternionMatrix<Real>::ComplexMatrix solution =
-      chi.completeOrthogonalDecomposition().solve(rhs);
+  const auto factors = chi.completeOrthogonalDecomposition();
+  const typename QuaternionMatrix<Real>::ComplexMatrix solution = factors.solve(rhs);
+  if (dependent) {
+    // Columns that are rounding beside the others, or become so once these are taken away.
+    const Real half = sqrt(std::numeric_limits<Real>::epsilon());
+    const auto pivots = factors.matrixQTZ().diagonal().cwiseAbs().eval();
+    *dependent = chi.cols() > 2 && (!(pivots.minCoeff() > half * pivots.maxCoeff()) ||
+                                    !(scale.minCoeff() > half * scale.maxCoeff()));
+  }
   auto b = QuaternionMatrix<Real>::from_adjoint_columns(solution);
   internal::scale_rows(b, scale);
   return b;

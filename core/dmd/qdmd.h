@@ -1,10 +1,13 @@
 // Q-DMD (the paper's Algorithm 2), one function for each way to it.
 #pragma once
 
-#include "core/dmd/modes.h"
+#include "core/dmd/snapshot_factor.h"
 #include "core/gram/window.h"
 
 namespace qdmd {
+
+// R in double-double, rounded at the end: as good as a QR factorization of the pixels.
+SnapshotFactor<double> factorize_gram_extended(const QuaternionMatrixd& g);
 
 // From the quaternion Gram matrix g = [x_1 .. x_m]^H [x_1 .. x_m] (m x m, Hermitian) alone, for
 // Solver::gram and Solver::gram_extended. The Gram matrix squares singular values: those below

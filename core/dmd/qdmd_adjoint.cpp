@@ -97,8 +97,8 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   // Step 4, then the background's share.
   const QuaternionMatrixd lower = v_over_s * w;
   const QuaternionMatrixd phi = y * lower;
-  const auto chosen =
-      select_background<double>(eigenvalues, options.omega_threshold, options.max_modes);
+  const auto chosen = select_background<double>(eigenvalues, options.omega_threshold,
+                                                options.max_modes, &result.selection);
   const Index modes = static_cast<Index>(chosen.size());
   result.eigenvalues.resize(modes);
   result.combination = QuaternionMatrixd(m, modes);

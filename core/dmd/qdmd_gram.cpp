@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "core/dmd/estimator.h"
 #include "core/dmd/qdmd.h"
 #include "core/dmd/reduced_qdmd.h"
 #include "core/quaternion/double_double.h"
@@ -15,29 +16,31 @@ QuaternionMatrix<To> cast(const QuaternionMatrix<From>& m) {
   return {m.a.unaryExpr(convert), m.b.unaryExpr(convert)};
 }
 
-// R in double-double, rounded at the end: as good as a QR factorization of the pixels.
-SnapshotFactor<double> factorize_gram_extended(QuaternionMatrixd g) {
-  const auto exact = cast<DoubleDouble>(g);
-  const Eigen::Index m = g.rows();
-  g = {};  // memory for what comes
-  const auto extended = factorize_gram(exact);
+}  // namespace
+
+SnapshotFactor<double> factorize_gram_extended(const QuaternionMatrixd& g) {
+  const auto extended = factorize_gram(cast<DoubleDouble>(g));
   SnapshotFactor<double> factor;
   factor.r = cast<double>(extended.r);
   factor.triangular = extended.triangular;
-  factor.tolerance = gram_tolerance(m);
+  factor.tolerance = gram_tolerance(g.rows());
   return factor;
 }
 
-}  // namespace
-
 template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&, const DmdOptions&);
+namespace internal {
+template std::optional<QuaternionModes<double>> modes_from_schur_form(const Projection<double>&,
+                                                                      const SnapshotFactor<double>&,
+                                                                      const DmdOptions&);
+template PastSpectrum<double> past_spectrum(const SnapshotFactor<double>&, Eigen::Index);
+}  // namespace internal
 
 BackgroundModes qdmd_from_gram(QuaternionMatrixd g, const DmdOptions& options) {
   if (options.solver == Solver::gram_extended)
-    return reduced_qdmd(factorize_gram_extended(std::move(g)), options);
+    return solve_factor(factorize_gram_extended(g), options);
   const auto factor = factorize_gram(g);
   g = {};
-  return reduced_qdmd(factor, options);
+  return solve_factor(factor, options);
 }
 
 }  // namespace qdmd

@@ -82,6 +82,8 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
     fit_to_window(&result, factor.r * result.combination, factor.r);
   }
   describe_nearest(&result, pair->residual);
+  result.selection.margin = static_cast<double>(pair->margin);
+  result.selection.exact = pair->exact;
   return result;
 }
 
@@ -97,8 +99,12 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   const auto identity = QuaternionMatrix<Real>::identity(rank);
   if (amplitude == Amplitude::window)
     return nearest_mode<Real>(h, identity, &coefficients, nullptr, factor);
-  const auto a = least_squares<Real>(factor.r.right_cols(later) * coefficients, factor.r.col(0));
-  return nearest_mode<Real>(h, identity, &coefficients, &a, factor);
+  bool dependent = false;
+  const auto a =
+      least_squares<Real>(factor.r.right_cols(later) * coefficients, factor.r.col(0), &dependent);
+  auto result = nearest_mode<Real>(h, identity, &coefficients, &a, factor);
+  if (result) result->selection.dependent = dependent;
+  return result;
 }
 
 // All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
@@ -110,12 +116,14 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
   const ComplexVector<Real> eigenvalues = form.eigenvalues();
+  Selection selection;
   const auto chosen =
-      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes);
+      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
   const auto coefficients = projection.coefficients * form.q;
 
   // Step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
   QuaternionModes<Real> result(m, static_cast<Eigen::Index>(chosen.size()));
+  result.selection = selection;
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p) {
     const Eigen::Index k = chosen[static_cast<size_t>(p)];
     const auto w = triangular_eigenvector(form.t, k);
@@ -130,7 +138,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
     return result;
   }
   if (chosen.size() == 1) {
-    const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0));
+    const auto a = least_squares<Real>(factor.r.right_cols(m - 1) * coefficients, factor.r.col(0),
+                                       &result.selection.dependent);
     const auto b = amplitude_from_left_vector<Real>(triangular_left_eigenvector(form.t, chosen[0]),
                                                     triangular_eigenvector(form.t, chosen[0]), a);
     if (b) {
@@ -142,7 +151,8 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
   QuaternionModes<Real> all(m, rank);
   for (Eigen::Index k = 0; k < rank; ++k)
     set_combination(&all, k, coefficients * triangular_eigenvector(form.t, k));
-  const auto b = least_squares<Real>(factor.r * all.combination, factor.r.col(0));
+  const auto b =
+      least_squares<Real>(factor.r * all.combination, factor.r.col(0), &result.selection.dependent);
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p)
     result.amplitudes.set(p, 0, b.get(chosen[static_cast<size_t>(p)], 0));
   return result;
@@ -181,6 +191,7 @@ std::optional<QuaternionModes<Real>> full_rank_modes(const SnapshotFactor<Real>&
     projection.q_tilde = h * projection.coefficients;
     h = {};
     result = modes_from_schur_form(projection, factor, options);
+    if (result) result->selection.operator_size = static_cast<double>(projection.q_tilde.norm());
   }
   if (!result || !result->combination.all_finite() || !result->amplitudes.all_finite())
     return std::nullopt;
@@ -281,6 +292,7 @@ QuaternionModes<Real> projected_modes(const SnapshotFactor<Real>& factor,
       none.summary.converged = false;
       continue;
     }
+    result->selection.operator_size = static_cast<double>(projection.q_tilde.norm());
     result->summary.converged = none.summary.converged;
     result->summary.rank = static_cast<int>(rank);
     result->summary.condition = static_cast<double>(spectrum.sigma(0) / spectrum.sigma(rank - 1));
@@ -304,7 +316,13 @@ QuaternionModes<Real> reduced_qdmd(const SnapshotFactor<Real>& factor, const Dmd
   return internal::projected_modes(factor, options);
 }
 
+// In double they are compiled once.
 extern template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&,
                                                      const DmdOptions&);
+namespace internal {
+extern template std::optional<QuaternionModes<double>> modes_from_schur_form(
+    const Projection<double>&, const SnapshotFactor<double>&, const DmdOptions&);
+extern template PastSpectrum<double> past_spectrum(const SnapshotFactor<double>&, Eigen::Index);
+}  // namespace internal
 
 }  // namespace qdmd

@@ -35,6 +35,16 @@ void TemporalModel::add_channel_mode(int channel, const Eigen::VectorXcd& combin
   if (row_count == 2) add_row(combination.imag());
 }
 
+bool TemporalModel::all_finite() const {
+  const auto finite = [](const Quaterniond& q) { return std::isfinite(q.squared_norm()); };
+  return std::all_of(terms_.begin(), terms_.end(),
+                     [&](const Term& term) {
+                       return finite(Quaterniond(term.lambda)) && finite(term.amplitude) &&
+                              std::isfinite(term.reference_time);
+                     }) &&
+         std::all_of(rows_.begin(), rows_.end(), [](const auto& row) { return row.allFinite(); });
+}
+
 Eigen::MatrixXd TemporalModel::basis() const {
   Eigen::MatrixXd basis(picture_count(), 3 * snapshots_);
   for (size_t k = 0; k < rows_.size(); ++k)

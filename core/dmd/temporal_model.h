@@ -28,6 +28,8 @@ class TemporalModel {
                         std::complex<double> lambda, double reference_time,
                         std::complex<double> amplitude);
 
+  // No number in it is infinite or not one.
+  bool all_finite() const;
   Eigen::Index picture_count() const { return static_cast<Eigen::Index>(rows_.size()); }
   // K x 3m.
   Eigen::MatrixXd basis() const;

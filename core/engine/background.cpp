@@ -1,9 +1,28 @@
 #include "core/engine/background.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace qdmd {
+
+namespace {
+
+bool is_finite(const DmdSummary& summary) {
+  return std::isfinite(std::abs(summary.lambda)) && !std::isnan(summary.omega) &&
+         std::isfinite(summary.residual) && std::isfinite(summary.condition);
+}
+
+// L(t) is the same at all times.
+TemporalModel mean_of_frames(int frames) {
+  QuaternionMatrixd shares(frames, 1);
+  shares.a.setConstant(1.0 / frames);
+  TemporalModel model(frames);
+  model.add_mode(shares, 1.0, 0, Quaterniond(1.0));
+  return model;
+}
+
+}  // namespace
 
 Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room, Colours colours,
                        const DecisionSteps& steps)
@@ -75,11 +94,24 @@ void Background::build(Slice slice) { learner_->build(slice, &models_[next()]); 
 void Background::finish(const MaskWishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
+  if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
   next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold,
                                                   wishes.ignored, room_.frames->width());
   // Nobody decides before there is a first model.
   if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
     rehearse(wishes);
+}
+
+// Whatever a learner did: no model with a number that is not one is ever in use.
+void Background::replace_next() {
+  BackgroundModel& model = models_[next()];
+  model.begin(*snapshots_, mean_of_frames(snapshots_->size()), true);
+  model.build_slice(0, pixels());
+  next_report_.replaced = true;
+  next_report_.dmd = {};
+  next_report_.dmd.rank = next_report_.dmd.background_modes = 1;
+  next_report_.dmd.lambda = 1;
+  next_report_.dmd.converged = false;
 }
 
 // What moves is known before the first frame of a stream is decided.

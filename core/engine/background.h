@@ -96,6 +96,7 @@ class Background {
   const MaskWishes& wishes() const { return wishes_; }
 
  private:
+  void replace_next();
   void rehearse(const MaskWishes& wishes);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }

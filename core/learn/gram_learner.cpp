@@ -57,6 +57,7 @@ double GramLearner::solve_seconds(int window_size) const {
   if (options_.method == Method::dmd) return seconds;
   switch (options_.dmd.solver) {
     case Solver::gram:
+    case Solver::automatic:
       break;
     case Solver::gram_extended:
       seconds += 1e-7 * m * m * m;

@@ -13,7 +13,8 @@ std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, i
 
 std::span<const char* const> options_without_effect(Method method) {
   static constexpr const char* kOfQdmd[] = {"iterations", "absorb-time"};
-  static constexpr const char* kOfDmd[] = {"iterations", "solver", "absorb-time"};
+  static constexpr const char* kOfDmd[] = {"iterations", "solver", "estimator", "spectrum",
+                                           "absorb-time"};
   // What the paper fits to the first frame depends on what stood there.
   static constexpr const char* kOfRobust[] = {"amplitude"};
   switch (method) {

@@ -23,6 +23,8 @@ struct SolveFacts {
   int window_frames = 0;
   int sample_step = 1;  // the decomposition saw every k-th pixel in x and y
   int iterations = 1;
+  // The model was not finite: the mean of the window's frames is in its place.
+  bool replaced = false;
   // Seconds in the Gram matrix since the solve before, and in the solve.
   double gram_time = 0, solve_time = 0;
 };

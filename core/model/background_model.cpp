@@ -88,6 +88,15 @@ void BackgroundModel::combine_runs(const uint8_t* const* planes, size_t from, si
     }
 }
 
+bool BackgroundModel::is_finite() const {
+  // Sums of so many planes are pictures in single precision.
+  static constexpr double kLargest = 1e30;
+  const bool gains = std::all_of(gains_.begin(), gains_.end(), [](const Gain& gain) {
+    return std::all_of(gain.begin(), gain.end(), [](auto g) { return std::isfinite(g); });
+  });
+  return gains && model_.all_finite() && (basis_.array().abs() < kLargest).all();
+}
+
 void BackgroundModel::build(const SnapshotRange& snapshots, const TemporalModel& model) {
   begin(snapshots, model);
   build_slice(0, pixels_);

@@ -61,6 +61,9 @@ class BackgroundModel {
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
 
+  // L(t) is a number at every pixel and any t: nothing that it was made of is infinite or not one.
+  bool is_finite() const;
+
   // True while the snapshots are still read.
   bool reads_snapshots() const { return direct_ && !frozen_; }
   // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are

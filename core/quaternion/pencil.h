@@ -14,6 +14,10 @@ struct PencilEigenpair {
   std::complex<Real> value;
   std::vector<Quaternion<Real>> vector;
   Real residual;  // |H v - B v lambda| / (|H| + |lambda| |B|), at most 50 size epsilon
+  // How much farther the next eigenvalue is, in |ln lambda|; infinite where there is none. Not
+  // `exact`: at least so much.
+  Real margin;
+  bool exact;
 };
 
 // H v = B v lambda with H upper Hessenberg, B upper triangular with a non-zero diagonal, both
@@ -49,20 +53,30 @@ class Pencil {
         ++settled;
       if (settled == 0) continue;
       size_t best = 0;
-      Real nearest = std::numeric_limits<Real>::max();
+      Real nearest = std::numeric_limits<Real>::max(), next = nearest;
       for (size_t k = 0; k < settled; ++k) {
         if (!(abs(ritz.values[k]) > Real(0))) continue;
         const Real distance = qdmd::log(Quaternion<Real>(eigenvalue(ritz.values[k]))).norm();
-        if (distance < nearest) nearest = distance, best = k;
+        if (distance < nearest)
+          next = nearest, nearest = distance, best = k;
+        else
+          next = std::min(next, distance);
       }
       if (!space.complete()) {
         // |lambda - 1| >= d implies |ln lambda| >= ln(1 + d): nothing beyond the first unsettled
         // value can be nearer. Half of its residual's room is left for what is not seen yet.
         if (settled == ritz.values.size()) continue;
         const Real reach = abs(ritz.values[settled]) + Real(2) * ritz.residuals[settled];
-        if (!(nearest < log(Real(1) + Real(1) / reach))) continue;
+        const Real beyond = log(Real(1) + Real(1) / reach);
+        if (!(nearest < beyond)) continue;
+        next = std::min(next, beyond);
       }
-      return polished(space.combine(ritz.coordinates[best]));
+      auto pair = polished(space.combine(ritz.coordinates[best]));
+      if (!pair) return std::nullopt;
+      const bool alone = !(next < std::numeric_limits<Real>::max());
+      pair->margin = alone ? std::numeric_limits<Real>::infinity() : Real(next - nearest);
+      pair->exact = space.complete();
+      return pair;
     }
     return std::nullopt;
   }
@@ -128,7 +142,7 @@ class Pencil {
     const Quaternion<Real> lambda = Quaternion<Real>(Real(1)) + mu.inverse();
     const Quaternion<Real> turn = standardizing_rotation(lambda);
     for (auto& q : v) q = q * turn;
-    PencilEigenpair<Real> pair{standard(lambda), std::move(v), Real(0)};
+    PencilEigenpair<Real> pair{standard(lambda), std::move(v), Real(0), Real(0), false};
     pair.residual = residual(pair);
     // A step's rounding is small next to the operator, which is 1 / epsilon in size where 1 itself
     // is a defective eigenvalue: only this tells whether the pair is one.

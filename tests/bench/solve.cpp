@@ -131,7 +131,8 @@ DmdOptions every_mode() {
 }
 
 void frames(benchmark::internal::Benchmark* benchmark) {
-  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Unit(benchmark::kMillisecond);
+  benchmark->ArgName("m")->Arg(25)->Arg(50)->Arg(100)->Arg(200)->Arg(300)->Unit(
+      benchmark::kMillisecond);
 }
 // 100 frames of the complex adjoint take seconds.
 void few_frames(benchmark::internal::Benchmark* benchmark) {
@@ -140,7 +141,9 @@ void few_frames(benchmark::internal::Benchmark* benchmark) {
 
 // The default first, then its parts and the other solvers.
 void solve_gram(benchmark::State& s) { solve(s, options(Solver::gram)); }
+void solve_auto(benchmark::State& s) { solve(s, options(Solver::automatic)); }
 BENCHMARK(solve_gram)->Apply(frames);
+BENCHMARK(solve_auto)->Apply(frames);
 
 BENCHMARK(cholesky_double)->Apply(frames);
 BENCHMARK(cholesky_double_double)->Apply(frames);
@@ -150,9 +153,23 @@ BENCHMARK(hermitian_eigenproblem)->Apply(frames);
 BENCHMARK(singular_values)->Apply(frames);
 BENCHMARK(schur_form)->Apply(frames);
 
+DmdOptions estimated(Estimator estimator, int rank) {
+  DmdOptions result = options(Solver::automatic, rank);
+  result.estimator = estimator;
+  return result;
+}
+void solve_forward_backward(benchmark::State& s) {
+  solve(s, estimated(Estimator::forward_backward, 1));
+}
+void solve_total(benchmark::State& s) { solve(s, estimated(Estimator::total, 1)); }
+void solve_optimized(benchmark::State& s) { solve(s, estimated(Estimator::optimized, 0)); }
+void solve_optimized_rank_1(benchmark::State& s) { solve(s, estimated(Estimator::optimized, 1)); }
+
 void solve_gram_first_frame(benchmark::State& s) {
   solve(s, options(Solver::gram, 0, Amplitude::first_frame));
 }
+void solve_gram_rank_1(benchmark::State& s) { solve(s, options(Solver::gram, 1)); }
+void solve_auto_rank_1(benchmark::State& s) { solve(s, options(Solver::automatic, 1)); }
 void solve_gram_rank_3(benchmark::State& s) { solve(s, options(Solver::gram, 3)); }
 void solve_gram_every_mode(benchmark::State& s) { solve(s, every_mode()); }
 void solve_gram_extended(benchmark::State& s) { solve(s, options(Solver::gram_extended)); }
@@ -163,7 +180,13 @@ void solve_qr(benchmark::State& s) { solve(s, options(Solver::qr)); }
 void solve_adjoint(benchmark::State& s) { solve(s, options(Solver::adjoint)); }
 void solve_dmd(benchmark::State& s) { solve(s, options(Solver::gram), true); }
 
+BENCHMARK(solve_forward_backward)->Apply(frames);
+BENCHMARK(solve_total)->Apply(frames);
+BENCHMARK(solve_optimized)->Apply(frames);
+BENCHMARK(solve_optimized_rank_1)->Apply(frames);
 BENCHMARK(solve_gram_first_frame)->Apply(frames);
+BENCHMARK(solve_gram_rank_1)->Apply(frames);
+BENCHMARK(solve_auto_rank_1)->Apply(frames);
 BENCHMARK(solve_gram_rank_3)->Apply(frames);
 BENCHMARK(solve_gram_every_mode)->Apply(frames);
 BENCHMARK(solve_gram_extended)->Apply(frames);

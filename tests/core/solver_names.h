@@ -15,6 +15,8 @@ inline const char* name_of(Solver solver) {
       return "qr";
     case Solver::adjoint:
       return "adjoint";
+    case Solver::automatic:
+      return "auto";
   }
   return "";
 }

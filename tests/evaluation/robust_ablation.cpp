@@ -134,7 +134,7 @@ int main(int argc, char** argv) try {
 
   Pool pool(1);
   std::vector<std::vector<Outcome>> outcomes(chosen.size());
-  Selection selection;
+  evaluation::Selection selection;
   selection.thin = frames;
   for (size_t s = 0; s < sequences.size(); ++s) {
     const Clip clip = read_clip(sequences[s], selection);

@@ -142,7 +142,8 @@ def messages_as_documented(folder):
     pipeline = common.Gst.parse_launch(
         'qdmdscenesrc num-buffers=30 ! qdmdbackground window-size=10 post-messages=true ! fakesink')
     pipeline.set_state(common.Gst.State.PLAYING)
-    names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double'}
+    names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double',
+             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum'}
     try:
         for _ in range(3):
             message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,

@@ -265,21 +265,23 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   gst_util_set_object_arg(G_OBJECT(element), "omega-threshold", "0.25");
   gst_util_set_object_arg(G_OBJECT(element), "amplitude", "first-frame");
   gst_util_set_object_arg(G_OBJECT(element), "solver", "adjoint");
+  gst_util_set_object_arg(G_OBJECT(element), "estimator", "optimized");
   gst_util_set_object_arg(G_OBJECT(element), "foreground-threshold", "12.5");
   gst_util_set_object_arg(G_OBJECT(element), "max-memory", "5000000000");
   gst_util_set_object_arg(G_OBJECT(element), "n-threads", "7");
-  gint output, method, amplitude, solver, mode;
+  gint output, method, amplitude, solver, estimator, mode;
   guint window, rank, threads;
   gdouble omega, threshold;
   guint64 memory;
   g_object_get(element, "output", &output, "method", &method, "amplitude", &amplitude, "solver",
-               &solver, "mode", &mode, "window-size", &window, "rank", &rank, "omega-threshold",
-               &omega, "foreground-threshold", &threshold, "max-memory", &memory, "n-threads",
-               &threads, nullptr);
+               &solver, "estimator", &estimator, "mode", &mode, "window-size", &window, "rank",
+               &rank, "omega-threshold", &omega, "foreground-threshold", &threshold, "max-memory",
+               &memory, "n-threads", &threads, nullptr);
   EXPECT_EQ(3, output);
   EXPECT_EQ(1, method);
   EXPECT_EQ(1, amplitude);
   EXPECT_EQ(3, solver);
+  EXPECT_EQ(3, estimator);
   EXPECT_EQ(0, mode);
   EXPECT_EQ(33u, window);
   EXPECT_EQ(3u, rank);

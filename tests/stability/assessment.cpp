@@ -76,6 +76,7 @@ Precision precision(Solver solver, double pixels, double frames, double conditio
     case Solver::qr:
       return {std::max(pixels, frames) * kEpsilon, tall};
     case Solver::adjoint:
+    case Solver::automatic:
       break;
   }
   return {2 * std::max(pixels, frames) * kEpsilon, tall};

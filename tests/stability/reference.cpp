@@ -92,6 +92,7 @@ Answer Reference::evaluate(const QuaternionModes<Decimal>& modes) const {
   const Eigen::Index m = factor_.r.cols(), probes = pixels_.rows() / 3;
   Answer answer;
   answer.rank = modes.summary.rank;
+  answer.converged = modes.summary.converged;
   answer.modes = static_cast<int>(modes.eigenvalues.size());
   if (answer.modes > 0) answer.lambda = modes.eigenvalues(0);
   Decimal largest_sum(1), largest_part(1);

@@ -24,6 +24,7 @@ struct Answer {
   double cancellation = 1;
   // (sum_t |x_t - L(t)|^2 / sum_t |x_t|^2)^(1/2)
   double fit = 0;
+  bool converged = true;  // as in DmdSummary
 };
 
 // The same algorithm on the same window in `Decimal`. The Gram matrix is exact and 50 digits are
