@@ -419,6 +419,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
   for (GType type :
        {gst_qdmd_background_output_get_type(), gst_qdmd_background_mode_get_type(),
         gst_qdmd_background_method_get_type(), gst_qdmd_background_amplitude_get_type(),
-        gst_qdmd_background_solver_get_type(), gst_qdmd_background_estimator_get_type()})
+        gst_qdmd_background_solver_get_type(), gst_qdmd_background_shadows_get_type(),
+        gst_qdmd_background_stabilize_get_type(), gst_qdmd_background_estimator_get_type()})
     gst_type_mark_as_plugin_api(type, GstPluginAPIFlags(0));
 }

@@ -58,6 +58,20 @@ GType gst_qdmd_background_method_get_type() {
   return type;
 }
 
+GType gst_qdmd_background_stabilize_get_type() {
+  using qdmd::Stabilize;
+  static const GEnumValue values[] = {
+      {int(Stabilize::off), "The camera stands still: frames are taken as they come", "off"},
+      {int(Stabilize::translation), "It looks to the left and right, up and down", "translation"},
+      {int(Stabilize::similarity),
+       "It also turns around its axis and zooms, a few degrees and "
+       "percent",
+       "similarity"},
+      {0, nullptr, nullptr}};
+  static const GType type = g_enum_register_static("GstQdmdBackgroundStabilize", values);
+  return type;
+}
+
 const char* qdmd::method_name(Method method) {
   auto* methods = static_cast<GEnumClass*>(g_type_class_ref(gst_qdmd_background_method_get_type()));
   const char* name = g_enum_get_value(methods, gint(method))->value_nick;

@@ -9,6 +9,7 @@
 // enumerations.
 GType gst_qdmd_background_output_get_type();
 GType gst_qdmd_background_shadows_get_type();
+GType gst_qdmd_background_stabilize_get_type();
 GType gst_qdmd_background_method_get_type();
 GType gst_qdmd_background_amplitude_get_type();
 GType gst_qdmd_background_solver_get_type();

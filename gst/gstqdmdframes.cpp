@@ -107,6 +107,7 @@ static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 f
   state->counters.frames_out += frames_out;
   state->counters.solve_period = guint(engine.time_budget().effort().period);
   state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
+  state->counters.camera = engine.newest_pose();
   state->report = engine.report();
   GST_OBJECT_UNLOCK(self);
 }
@@ -163,16 +164,48 @@ static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
 // Says that the frame of that time, or one a few frames before it, began another scene.
 static void tell_of_scene(GstQdmdBackground* self, GstClockTime timestamp) {
   State* state = self->state;
-  const guint64 scenes = state->engine.scenes();
+  const guint64 scenes = state->engine.scenes(), views = state->engine.views();
   if (scenes > state->scenes_told) {
     GST_INFO_OBJECT(self, "another scene: learning begins anew");
     gst_element_post_message(
         GST_ELEMENT(self),
         gst_message_new_element(GST_OBJECT(self),
-                                make_scene_message(GST_BASE_TRANSFORM(self)->segment, timestamp)));
+                                make_scene_message(GST_BASE_TRANSFORM(self)->segment, timestamp,
+                                                   views > state->views_told)));
   }
   // An engine that is configured anew counts anew.
   state->scenes_told = scenes;
+  state->views_told = views;
+}
+
+// Says where the camera looked in a frame that leaves, as long as it moves.
+static void tell_of_camera(GstQdmdBackground* self, const Pose& pose, GstClockTime timestamp) {
+  State* state = self->state;
+  const bool moves = !pose.is_rest() || state->camera_moved;
+  state->camera_moved = !pose.is_rest();
+  if (!moves) return;
+  GST_OBJECT_LOCK(self);
+  const bool post = state->settings.post_messages;
+  GST_OBJECT_UNLOCK(self);
+  if (!post) return;
+  gst_element_post_message(
+      GST_ELEMENT(self),
+      gst_message_new_element(
+          GST_OBJECT(self),
+          make_camera_message(GST_BASE_TRANSFORM(self)->segment, timestamp, pose)));
+}
+
+// Says once that frames cannot be moved.
+static void warn_of_no_room(GstQdmdBackground* self) {
+  State* state = self->state;
+  if (!state->engine.has_no_room_for_motion() || std::exchange(state->warned_of_no_room, true))
+    return;
+  GST_ELEMENT_WARNING(
+      self, RESOURCE, NO_SPACE_LEFT,
+      ("The camera moves, and max-memory has no room for a second copy of the window, which "
+       "stabilize needs then: frames are taken as they come. Raise max-memory, lower window-size, "
+       "or set stabilize=off."),
+      (nullptr));
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
@@ -239,6 +272,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
     return flow;
   }
   const std::vector<Region>* regions = nullptr;
+  Pose pose;
   {
     MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
     if (!frame) {
@@ -251,7 +285,9 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       engine.set_foreground_threshold(settings.engine.foreground_threshold);
       engine.set_shadows(settings.shadows);
       engine.set_mask_softness(settings.engine.mask_softness);
+      engine.set_stabilize_output(settings.stabilize_output);
       engine.set_ignored(ignored_of(settings, shell.get()));
+      pose = engine.next_pose();
       if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
       engine.pop(settings.output, frame.view<uint8_t>());
       note_solve(self, shell.get());
@@ -265,6 +301,7 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   if (regions) attach(buffer.get(), *regions);
   publish_report(self, 0, 1);
   tell_of_solve(self, shell.get());
+  tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
   *out = buffer.release();
   return GST_FLOW_OK;
 }
@@ -488,6 +525,7 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   }
   publish_report(self, 1, 0);
   tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
+  warn_of_no_room(self);
   tell_of_solve(self, nullptr);
   follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;

@@ -36,6 +36,7 @@
 
 #include <exception>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -64,6 +65,7 @@ struct Settings {
   std::string scene = "default", effects;
   guint64 seed = 0;
   Truth truth = TRUTH_NONE;
+  gboolean post_messages = FALSE;
 };
 
 struct Private {
@@ -119,7 +121,7 @@ static GType gst_qdmd_scene_src_truth_get_type() {
 
 // ---- Properties ---------------------------------------------------------------------------------
 
-enum { PROP_0, PROP_SCENE, PROP_EFFECTS, PROP_SEED, PROP_TRUTH, PROP_IS_LIVE };
+enum { PROP_0, PROP_SCENE, PROP_EFFECTS, PROP_SEED, PROP_TRUTH, PROP_POST_MESSAGES, PROP_IS_LIVE };
 
 static void gst_qdmd_scene_src_set_property(GObject* object, guint id, const GValue* value,
                                             GParamSpec* spec) {
@@ -145,6 +147,9 @@ static void gst_qdmd_scene_src_set_property(GObject* object, guint id, const GVa
       break;
     case PROP_TRUTH:
       settings.truth = Truth(g_value_get_enum(value));
+      break;
+    case PROP_POST_MESSAGES:
+      settings.post_messages = g_value_get_boolean(value);
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
@@ -173,6 +178,9 @@ static void gst_qdmd_scene_src_get_property(GObject* object, guint id, GValue* v
       break;
     case PROP_TRUTH:
       g_value_set_enum(value, settings.truth);
+      break;
+    case PROP_POST_MESSAGES:
+      g_value_set_boolean(value, settings.post_messages);
       break;
     default:
       G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
@@ -237,6 +245,18 @@ static void write_greys(Private* priv, uint8_t (*level_of)(uint8_t), MappedVideo
   });
 }
 
+// Where the camera looks in the frame of that time.
+static void tell_of_camera(GstQdmdSceneSrc* self, const Scene& scene, GstClockTime timestamp) {
+  gst_element_post_message(
+      GST_ELEMENT(self),
+      gst_message_new_element(
+          GST_OBJECT(self),
+          gst_structure_new("qdmdscenesrc-camera", "timestamp", G_TYPE_UINT64, guint64(timestamp),
+                            "camera-x", G_TYPE_DOUBLE, scene.shift_x(), "camera-y", G_TYPE_DOUBLE,
+                            scene.shift_y(), "camera-angle", G_TYPE_DOUBLE,
+                            scene.turn() * 180 / std::numbers::pi, nullptr)));
+}
+
 static GstFlowReturn gst_qdmd_scene_src_fill(GstPushSrc* source, GstBuffer* buffer) {
   GstQdmdSceneSrc* self = GST_QDMD_SCENE_SRC(source);
   Private* priv = self->priv;
@@ -275,6 +295,7 @@ static GstFlowReturn gst_qdmd_scene_src_fill(GstPushSrc* source, GstBuffer* buff
   GST_BUFFER_PTS(buffer) = time_of(priv, priv->index);
   GST_BUFFER_DTS(buffer) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(buffer) = time_of(priv, priv->index + 1) - GST_BUFFER_PTS(buffer);
+  if (priv->playing.post_messages) tell_of_camera(self, *priv->scene, GST_BUFFER_PTS(buffer));
   GST_BUFFER_OFFSET(buffer) = guint64(priv->index);
   GST_BUFFER_OFFSET_END(buffer) = guint64(priv->index + 1);
   priv->index += priv->step;
@@ -516,6 +537,14 @@ static void gst_qdmd_scene_src_class_init(GstQdmdSceneSrcClass* klass) {
       object_class, PROP_TRUTH,
       g_param_spec_enum("truth", "Truth", "Send the ground truth of the same frames instead",
                         gst_qdmd_scene_src_truth_get_type(), TRUTH_NONE, ready));
+  g_object_class_install_property(
+      object_class, PROP_POST_MESSAGES,
+      g_param_spec_boolean("post-messages", "Post messages",
+                           "Post an element message `qdmdscenesrc-camera` for each frame: its "
+                           "timestamp, and where the camera looks beside its place, camera-x and "
+                           "camera-y in pixels to the right and down and camera-angle in degrees "
+                           "clockwise",
+                           FALSE, ready));
   g_object_class_install_property(
       object_class, PROP_IS_LIVE,
       g_param_spec_boolean("is-live", "Is live",

@@ -245,6 +245,22 @@ const Property kProperties[] = {
      [](const Settings& s, GValue* v) {
        g_value_set_static_string(v, g_quark_to_string(s.ignored_type));
      }},
+    {[](const Settings& d) {
+       return g_param_spec_enum(
+           "stabilize", "Stabilize",
+           "How a camera that shakes or drifts may move: frames are moved to where it saw the "
+           "background, up to an eighth of the picture, and masks and backgrounds back to where "
+           "it looks",
+           gst_qdmd_background_stabilize_get_type(), gint(d.engine.stabilize), kAtStart);
+     },
+     QDMD_ENUM(s.engine.stabilize)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean("stabilize-output", "Stabilize the output",
+                                   "Send pictures as they would be if the camera stood still, in "
+                                   "place of where it looks; alpha stays as it came",
+                                   d.stabilize_output, kControllable);
+     },
+     QDMD_BOOLEAN(s.stabilize_output)},
 };
 
 }  // namespace

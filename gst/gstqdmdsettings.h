@@ -10,22 +10,28 @@
 
 namespace qdmd {
 
+inline EngineOptions with_stabilize(Stabilize stabilize) {
+  EngineOptions options;
+  options.stabilize = stabilize;
+  return options;
+}
+
 struct Settings {
   Output output = Output::background;
   Shadows shadows = Shadows::background;
-  bool freeze = false, post_messages = false, regions = false;
+  bool freeze = false, post_messages = false, regions = false, stabilize_output = false;
   int regions_min_area = 0;  // pixels
   double time_budget = 0;    // milliseconds a frame; 0: no limit
   double absorb_time = 300;  // seconds; 0: never
   IgnoredAreas ignored;
   GQuark ignored_type = 0;  // of regions of interest that are ignored, too; 0: none
-  EngineOptions engine;
+  EngineOptions engine = with_stabilize(Stabilize::translation);
   guint asked = 0;  // what somebody has set, a bit for each id
 };
 
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
 void install_settings(GObjectClass* klass);
-inline constexpr guint kFirstFreeProperty = 27;
+inline constexpr guint kFirstFreeProperty = 29;
 static_assert(kFirstFreeProperty <= 32, "Settings::asked has a bit for each");
 
 // False where no setting has this id. The caller holds the lock that protects `settings`.

@@ -50,9 +50,10 @@ struct State {
   BufferQueue shells;
   std::vector<guint8> mask, residual;  // for regions
   RegionFinder regions;
-  guint64 solves_told = 0, scenes_told = 0;  // of the engine's
+  guint64 solves_told = 0, scenes_told = 0, views_told = 0;  // of the engine's
   guint breaks = 0;  // in time, one after another, with a frame between them
-  bool warned_of_breaks = false;
+  bool warned_of_breaks = false, warned_of_no_room = false;
+  bool camera_moved = false;                    // in the frame that left last
   guint warned = 0;                             // settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };

@@ -1,6 +1,7 @@
 #include "gst/solvereport.h"
 
 #include <complex>
+#include <numbers>
 
 #include "gst/gstqdmdenums.h"
 
@@ -16,6 +17,8 @@ struct FrameTimes {
   }
   guint64 stream = GST_CLOCK_TIME_NONE, running = GST_CLOCK_TIME_NONE;
 };
+
+double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 GValue value_of(double number) {
   GValue value = G_VALUE_INIT;
@@ -78,18 +81,32 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
       "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
       "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT,
       guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,
-      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, nullptr);
+      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, "camera-x", G_TYPE_DOUBLE,
+      counters.camera.x, "camera-y", G_TYPE_DOUBLE, counters.camera.y, "camera-angle",
+      G_TYPE_DOUBLE, degrees(counters.camera.angle), nullptr);
   GValue lambda = value_of(report.dmd.lambda);
   gst_structure_take_value(stats, "lambda", &lambda);
   add_spectrum(report.dmd, stats);
   return stats;
 }
 
-GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp) {
+GstStructure* make_camera_message(const GstSegment& segment, GstClockTime timestamp,
+                                  const Pose& camera) {
+  const FrameTimes times(segment, timestamp);
+  return gst_structure_new("qdmdbackground-camera", "timestamp", G_TYPE_UINT64, guint64(timestamp),
+                           "stream-time", G_TYPE_UINT64, times.stream, "running-time",
+                           G_TYPE_UINT64, times.running, "camera-x", G_TYPE_DOUBLE, camera.x,
+                           "camera-y", G_TYPE_DOUBLE, camera.y, "camera-angle", G_TYPE_DOUBLE,
+                           degrees(camera.angle), nullptr);
+}
+
+GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp,
+                                 bool camera_moved) {
   const FrameTimes times(segment, timestamp);
   return gst_structure_new("qdmdbackground-scene", "timestamp", G_TYPE_UINT64, guint64(timestamp),
                            "stream-time", G_TYPE_UINT64, times.stream, "running-time",
-                           G_TYPE_UINT64, times.running, nullptr);
+                           G_TYPE_UINT64, times.running, "camera-moved", G_TYPE_BOOLEAN,
+                           gboolean(camera_moved), nullptr);
 }
 
 GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,

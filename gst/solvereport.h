@@ -13,6 +13,7 @@ struct Counters {
   // for each frame.
   guint solve_period = 1;
   double time_per_frame = 0;
+  Pose camera;  // of the newest frame that came in
 };
 
 // The property `stats`.
@@ -23,7 +24,13 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
                                  const GstSegment& segment, GstClockTime timestamp,
                                  GstClockTime duration);
 
-// The element message of another scene, noticed with the frame of that timestamp.
-GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp);
+// The element message of another scene, noticed with the frame of that timestamp. camera_moved: the
+// camera went on to it.
+GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timestamp,
+                                 bool camera_moved);
+
+// The element message of where the camera looked in the frame of that timestamp.
+GstStructure* make_camera_message(const GstSegment& segment, GstClockTime timestamp,
+                                  const Pose& camera);
 
 }  // namespace qdmd

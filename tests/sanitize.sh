@@ -39,7 +39,7 @@ long() {
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
     thread) names=(pool side_thread gram_slices live_schedule absorb another_scene) ;;
-    *) names=(kernel passes chroma picture combine gram gram_slices robust_fill robust_parts pool side_thread) ;;
+    *) names=(kernel passes chroma picture combine gram gram_slices robust_fill robust_parts pool side_thread resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done
   for name in features live; do targets+=("tests/gst/element-$name-test"); done

@@ -24,7 +24,7 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     collection_ = Collection{taken(), freeze};
     if (!waiting_) decide();
   }
-  if (!frames().append(frame)) return false;
+  if (!take(frame)) return false;
   ++queue->pending;
   ++collection_->not_added;
   if (!collection_->freeze && scene_seen() != SceneSeen::same)
@@ -167,6 +167,7 @@ void BatchSchedule::drain(Queue* queue) {
 }
 
 void BatchSchedule::restart() {
+  forget_camera();
   side().abandon();
   frames().clear();
   waiting_.reset();

@@ -57,6 +57,10 @@ class BatchSchedule : public Schedule {
     MaskWishes wishes = {};
   };
 
+  // Those of an earlier window are not known to be moved: they have their background.
+  bool holds_frames() const override {
+    return collection_ && collection_->begin + frames().size() == taken();
+  }
   int64_t taken() const { return static_cast<int64_t>(frames().frames_taken()); }
   int64_t kept_from() const { return taken() - frames().size(); }
   int collected() const { return collection_ ? static_cast<int>(taken() - collection_->begin) : 0; }

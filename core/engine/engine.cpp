@@ -54,7 +54,12 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   pass_wishes();
   background_->learner().set_absorb_frames(absorb_frames_);
   background_->decision().set_shadows(shadows_);
-  const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_, &clock_};
+  if (options.stabilize != Stabilize::off) {
+    stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
+    restorer_ = std::make_unique<Restorer>(width, height);
+  }
+  const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_,
+                       &clock_,  stabilizer_.get(), restorer_.get()};
   if (live)
     schedule_ = std::make_unique<LiveSchedule>(stage, plan);
   else
@@ -72,6 +77,8 @@ void Engine::close() {
   workers_.reset();
   background_.reset();
   soft_mask_.reset();
+  stabilizer_.reset();
+  restorer_.reset();
   frames_ = FrameStore();
 }
 
@@ -208,12 +215,41 @@ void Engine::soften(OutputTask* task) {
   std::copy_n(options_.levels.black, kChannels, task->black);
 }
 
+Pose Engine::next_pose() const {
+  return queue_.pending > 0 ? frames_.pose(frames_.slot(frames_.size() - queue_.pending)) : Pose();
+}
+
+// From the canvas to where the next frame's camera looked. level: L is needed.
+void Engine::return_to_frame(OutputTask* task, bool level) {
+  const Pose pose = next_pose();
+  if (pose.is_rest() || stabilize_output_) return;
+  const int slot = frames_.slot(frames_.size() - queue_.pending);
+  for (int c = 0; c < kChannels; ++c) task->x[c] = frames_.untouched(slot, c);
+  Resampler* const resampler = &stabilizer_->resampler();
+  Pool* const pool = workers_->side().idle() ? &workers_->pool() : nullptr;
+  if (level) {
+    restorer_->write_canvas(*task->model, frames_.window().pixels());
+    restorer_->restore_level(pose, task->x, resampler, pool);
+    for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
+  }
+  // What is ignored has its place in the frame.
+  const auto ignore = [&](uint8_t* mask) {
+    ignored_.clear_rows(0, frames_.height(), frames_.width(), mask);
+    return mask;
+  };
+  if (task->mask)
+    task->mask = ignore(restorer_->restore_mask(pose, task->mask, !task->soft, resampler, pool));
+  if (task->shaded)
+    task->shaded = ignore(restorer_->restore_shaded(pose, task->shaded, resampler, pool));
+}
+
 void Engine::foreground(uint8_t* mask, uint8_t* residual) {
   if (!ready()) return;
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
     OutputTask task = next_task(Output::mask);
     decide_next(&task);
+    return_to_frame(&task, true);
     std::copy_n(task.mask, frames_.window().pixels(), mask);
     const auto width = static_cast<size_t>(frames_.width());
     for (int y = 0; y < frames_.height(); ++y) {
@@ -221,6 +257,7 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
       const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
       const uint8_t* level[3];
       background_->decision().level(y, level);
+      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c] + first;
       residual_norm(x, level, width, residual + first);
     }
   });
@@ -275,6 +312,7 @@ void Engine::pop(Output output, const MutableImageView& out) {
       soften(&task);
     else if (soft_mask_)
       soft_mask_->forget();
+    return_to_frame(&task, output == Output::background || output == Output::foreground);
     const int height = frames_.height(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
     const auto write = [&](int first, int count, size_t) {

@@ -100,6 +100,17 @@ class Engine {
   void set_absorb_frames(int64_t frames);
   // What masks make of pixels that only light tells from the background. Takes effect at once.
   void set_shadows(Shadows shadows);
+  // While on, pop() and foreground() give the steady picture: frames, masks and backgrounds as they
+  // are on the canvas. Takes effect at once. EngineOptions::stabilize.
+  void set_stabilize_output(bool stabilize) { stabilize_output_ = stabilize; }
+  // Where the camera looked in the newest frame that was pushed, and in that which pop() gives next
+  // (at rest where none waits).
+  Pose newest_pose() const { return stabilizer_ ? stabilizer_->motion() : Pose(); }
+  Pose next_pose() const;
+  // How often the camera went on, further than an eighth of the picture, to another view.
+  uint64_t views() const { return stabilizer_ ? stabilizer_->views() : 0; }
+  // max_memory has no room to hold frames of a camera that moves: they are taken as they come.
+  bool has_no_room_for_motion() const { return schedule_ && schedule_->has_no_room(); }
   // While on, the background stays the picture that it was, and nothing is solved; only the first
   // model is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
@@ -117,6 +128,7 @@ class Engine {
  private:
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
+  void return_to_frame(OutputTask* task, bool level);
   void decide_next(OutputTask* task);
   void soften(OutputTask* task);
   void pass_wishes();
@@ -132,7 +144,10 @@ class Engine {
   int64_t absorb_frames_ = 0;
   IgnoredAreas ignored_;
   Shadows shadows_ = Shadows::background;
+  bool stabilize_output_ = false;
   FrameStore frames_;
+  std::unique_ptr<Stabilizer> stabilizer_;
+  std::unique_ptr<Restorer> restorer_;
   std::unique_ptr<Background> background_;
   std::unique_ptr<SoftMask> soft_mask_;
   std::unique_ptr<Schedule> schedule_;

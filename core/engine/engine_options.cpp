@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/align/restorer.h"
 #include "core/foreground/decision.h"
 #include "core/foreground/soft_mask.h"
 #include "core/learn/learner.h"
@@ -53,8 +54,11 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   }
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks = Decision::bytes(width, height) + layout.soft_bytes;
+  const uint64_t camera = options.stabilize == Stabilize::off
+                              ? 0
+                              : Stabilizer::bytes(width, height) + Restorer::bytes(width, height);
   layout.bytes = saturating_sum(
-      saturating_sum(layout.store_bytes, masks),
+      saturating_sum(layout.store_bytes, masks + camera),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
                     Workers::count(options.threads)));
   return layout;

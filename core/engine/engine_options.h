@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/align/stabilizer.h"
 #include "core/base/levels.h"
 #include "core/base/status.h"
 #include "core/engine/live_plan.h"
@@ -26,6 +27,7 @@ struct EngineOptions : LearnOptions {
   Levels levels;                            // of the frames
   DecisionSteps steps;                      // of masks
   double foreground_threshold = 0;          // grey levels, quaternion norm; 0: from the noise
+  Stabilize stabilize = Stabilize::off;     // how the camera may move
   int mask_softness = 0;                    // pixels, Engine::set_mask_softness()
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result

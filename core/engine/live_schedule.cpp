@@ -30,7 +30,7 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     frames().clear();
     begin_window(has_model);
   }
-  if (!frames().append(frame)) return false;
+  if (!take(frame)) return false;
   if (!frozen) follow_scene();
   if (!frozen) begin_work();
   if (background().state() != State::held)
@@ -169,6 +169,7 @@ void LiveSchedule::begin_window(bool has_model) {
 }
 
 void LiveSchedule::restart() {
+  forget_camera();
   stop();
   left_.reset();
   frames().clear();

@@ -54,6 +54,7 @@ class LiveSchedule : public Schedule {
     Gain light = kSameLight;
   };
 
+  bool holds_frames() const override { return false; }
   void follow_scene();
   void mend();
   void settle();

@@ -4,6 +4,8 @@
 #include <functional>
 #include <utility>
 
+#include "core/align/restorer.h"
+#include "core/align/stabilizer.h"
 #include "core/base/image_view.h"
 #include "core/base/status.h"
 #include "core/engine/background.h"
@@ -20,6 +22,9 @@ struct Stage {
   Workers* workers;
   Pace* pace;
   Clock* clock;
+  // Of a camera that may move; or null, both.
+  Stabilizer* stabilizer = nullptr;
+  Restorer* restorer = nullptr;
 };
 
 // Frames that were pushed and wait to be popped: the newest `pending` of the store. The oldest
@@ -58,10 +63,28 @@ class Schedule {
   virtual void show(int index) = 0;
   // The same for the newest background.
   virtual void show_newest() = 0;
+  // There is no room in max-memory for frames before and after they were moved to the canvas: they
+  // stay as they come.
+  bool has_no_room() const { return no_room_; }
   // Of the frames that wait, the next so many leave with the background in use.
   virtual int frames_left(const Queue& queue) const = 0;
 
  protected:
+  // Copies a frame in, and moves it to where the camera saw the background. False:
+  // FrameStore::append.
+  bool take(const ImageView& frame);
+  // True where frames before the newest are compared with backgrounds to come.
+  virtual bool holds_frames() const = 0;
+  // Nothing that is known of the camera and its background holds for the next frame.
+  void forget_camera() {
+    if (stage_.stabilizer) stage_.stabilizer->forget();
+    referred_to_ = 0;
+  }
+  // Frames are compared with another background, from the next one on.
+  void refer_anew() { referred_to_ = 0; }
+  // While the side thread works, its work has the pool.
+  Pool* idle_pool() const { return side().idle() ? &workers().pool() : nullptr; }
+
   FrameStore& frames() const { return *stage_.frames; }
   Background& background() const { return *stage_.background; }
   Workers& workers() const { return *stage_.workers; }
@@ -82,7 +105,11 @@ class Schedule {
   SceneSeen scene_seen() {
     if (!background().known() || background().state() == Background::State::held)
       return SceneSeen::same;
-    const SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    SceneSeen seen = background().learner().scene_of(frames().window().newest_slot());
+    if (stage_.stabilizer && stage_.stabilizer->began_view())
+      seen = SceneSeen::another;
+    else if (stage_.stabilizer && seen != SceneSeen::same)
+      stage_.stabilizer->begin_scene();
     scenes_ += seen == SceneSeen::same ? 0 : 1;
     return seen;
   }
@@ -90,9 +117,12 @@ class Schedule {
   void hold_up() { held_up_ = true; }
 
  private:
+  void move_canvas(const Pose& to);
+
   Stage stage_;
-  bool held_up_ = false;
+  bool held_up_ = false, no_room_ = false;
   uint64_t scenes_ = 0;
+  uint64_t referred_to_ = 0;  // the solve that frames are compared with; 0: of none
 };
 
 }  // namespace qdmd

@@ -91,6 +91,14 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   return statistics;
 }
 
+void OutputTask::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
+  if (!level[0]) {
+    model->evaluate(first, count, out);
+    return;
+  }
+  for (int c = 0; c < kChannels; ++c) std::copy_n(level[c] + first, count, out[c]);
+}
+
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count) {
   BackgroundRun background;
@@ -111,11 +119,11 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
       const uint8_t* channels[3] = {made[0], made[1], made[2]};
       switch (task.output) {
         case Output::background:
-          task.model->evaluate(first, count, background.rows);
+          task.evaluate(first, count, background.rows);
           std::copy_n(background.rows, kChannels, channels);
           break;
         case Output::foreground:
-          task.model->evaluate(first, count, background.rows);
+          task.evaluate(first, count, background.rows);
           for (int c = 0; c < kChannels; ++c)
             absolute_residual(x[c], background.level[c], count, made[c]);
           break;

@@ -49,6 +49,11 @@ struct OutputTask {
   bool soft = false;       // the mask
   // Samples of black.
   uint8_t black[3] = {0, 0, 0};
+  // L, in place of the model's; or null.
+  const uint8_t* level[3] = {nullptr, nullptr, nullptr};
+
+  // L at pixels first .. first + count - 1 (BackgroundModel::evaluate).
+  void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
 };
 
 // Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write

@@ -24,6 +24,12 @@ class IgnoredAreas {
   size_t size() const { return count_; }
   const Rectangle& operator[](size_t i) const { return areas_[i]; }
 
+  // True where pixel (x, y) is ignored.
+  bool has(int x, int y) const {
+    bool any = false;
+    visit(y, x, 1, [&](int64_t, int64_t) { any = true; });
+    return any;
+  }
   // Calls visit(begin, end) for runs left + begin .. left + end - 1 of row y that are ignored, of
   // columns left .. left + count - 1.
   template <typename Visit>

@@ -126,11 +126,11 @@ class Writer {
       if (shape_.has(c) && is_constant_[c]) std::memset(to[c], levels_.black[c], count);
     switch (task_.output) {
       case Output::background:
-        task_.model->evaluate(first, count, to);
+        task_.evaluate(first, count, to);
         break;
       case Output::foreground: {
         uint8_t* const level[3] = {room_.level[0], room_.level[1], room_.level[2]};
-        task_.model->evaluate(first, count, level);
+        task_.evaluate(first, count, level);
         for (int c = 0; c < 3; ++c)
           if (!is_constant_[c])
             residual_levels(task_.x[c] + first, level[c], levels_.black[c], levels_.white[c], count,

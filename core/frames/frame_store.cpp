@@ -1,5 +1,6 @@
 #include "core/frames/frame_store.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "core/passes/chroma.h"
@@ -41,7 +42,8 @@ FrameStore::FrameStore(int capacity, int width, int height, const FrameContents&
                                           : Window(capacity, pixels_of(width, height))),
       spread_(spread_size(width, height, contents)),
       constant_alpha_(static_cast<size_t>(capacity), 255),
-      varies_(static_cast<size_t>(capacity), 0) {
+      varies_(static_cast<size_t>(capacity), 0),
+      poses_(static_cast<size_t>(capacity)) {
   if (sample_step_ > 1) samples_ = PlaneSlots(capacity, sample_count(width, height, sample_step_));
   if (contents.cells_along > 0) {
     grid_ = Grid(width, height, contents.cells_along);
@@ -51,7 +53,8 @@ FrameStore::FrameStore(int capacity, int width, int height, const FrameContents&
 
 uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
   uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents));
-  uint64_t beside = 2 * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
+  uint64_t beside =
+      (2 + sizeof(Pose)) * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
   if (contents.sample_step > 1)
     beside += PlaneSlots::bytes(capacity, sample_count(width, height, contents.sample_step));
   if (contents.cells_along > 0)
@@ -62,7 +65,8 @@ uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameConte
 
 uint64_t FrameStore::bytes() const {
   return planes_.bytes() + samples_.bytes() + cells_.bytes() + (alpha_ ? alpha_bytes() : 0) +
-         spread_.size() + constant_alpha_.size() + varies_.size();
+         spread_.size() + constant_alpha_.size() + varies_.size() + untouched_.bytes() +
+         poses_.size() * sizeof(Pose);
 }
 
 bool FrameStore::append(const ImageView& frame) {
@@ -72,7 +76,14 @@ bool FrameStore::append(const ImageView& frame) {
   const bool constant = take_planes(slot, frame, alpha);
   varies_[static_cast<size_t>(slot)] = !constant;
   constant_alpha_[static_cast<size_t>(slot)] = alpha;
+  poses_[static_cast<size_t>(slot)] = {};
   if (!constant && !keep_alpha(slot, frame)) return false;
+  take_contents(slot);
+  return true;
+}
+
+// What is made of the planes.
+void FrameStore::take_contents(int slot) {
   const uint8_t* planes[3] = {};
   if (sample_step_ > 1 || cells_.cells() > 0) read_planes(planes_, slot, spread_.data(), planes);
   if (sample_step_ > 1) {
@@ -82,6 +93,28 @@ bool FrameStore::append(const ImageView& frame) {
   }
   if (cells_.cells() > 0)
     for (int c = 0; c < kChannels; ++c) cell_means(grid_, planes[c], cells_.plane(slot, c));
+}
+
+bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {
+  if (planes_.shape().is_shared()) return false;
+  if (untouched_.capacity() == 0) {
+    const uint64_t more = PlaneSlots::bytes(capacity(), planes_.pixels());
+    if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
+    untouched_ = PlaneSlots(capacity(), planes_.pixels());
+  }
+  const int slot = this->slot(index), before = index > 0 ? this->slot(index - 1) : slot;
+  const bool was_moved = !this->pose(slot).is_rest();
+  resampler->prepare(pool);
+  for (int c = 0; c < kChannels; ++c) {
+    uint8_t* const plane = planes_.plane(slot, c);
+    if (!was_moved) std::copy_n(plane, planes_.pixels(), untouched_.plane(slot, c));
+    std::copy_n(before != slot ? planes_.plane(before, c) : untouched_.plane(slot, c),
+                planes_.pixels(), plane);
+    resampler->run(untouched_.plane(slot, c), affine(inverse(pose), middle_of(width_, height_)),
+                   plane, width_, height_, pool);
+  }
+  poses_[static_cast<size_t>(slot)] = pose;
+  take_contents(slot);
   return true;
 }
 

@@ -5,6 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/align/pose.h"
+#include "core/align/resampler.h"
 #include "core/base/image_view.h"
 #include "core/gram/window.h"
 #include "core/passes/grid.h"
@@ -42,6 +44,11 @@ class FrameStore {
   // varies, which needs more than `most_bytes`. Throws std::bad_alloc. The newest frame is then
   // undefined.
   bool append(const ImageView& frame);
+  // The planes, samples and cells of frame `index` become what the canvas shows of them; the planes
+  // as they came stay in untouched(). What is outside of the frame is as in the frame before, or,
+  // where there is none, as in this one. False, and nothing is done: there is no room in
+  // `most_bytes`, or the frame's pixels share samples. Throws std::bad_alloc.
+  bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
   // Forgets all frames.
   void clear() { planes_.clear(); }
 
@@ -61,6 +68,9 @@ class FrameStore {
   const GridFrames& cells() const { return cells_; }
   // Samples of alpha in row order, or null where all are constant_alpha().
   const uint8_t* alpha(int slot) const;
+  // Where the frame's camera looked; and, where that is not at rest, its planes as they came.
+  const Pose& pose(int slot) const { return poses_[static_cast<size_t>(slot)]; }
+  const uint8_t* untouched(int slot, int channel) const { return untouched_.plane(slot, channel); }
   uint8_t constant_alpha(int slot) const { return constant_alpha_[static_cast<size_t>(slot)]; }
 
  private:
@@ -72,6 +82,7 @@ class FrameStore {
   }
   bool keep_alpha(int slot, const ImageView& frame);
   bool take_planes(int slot, const ImageView& frame, uint8_t alpha);
+  void take_contents(int slot);
 
   int width_ = 0, height_ = 0, sample_step_ = 1;
   uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
@@ -84,6 +95,9 @@ class FrameStore {
   // Video with alpha is nearly always opaque: its planes are kept only once one varies.
   std::unique_ptr<uint8_t[]> alpha_;
   std::vector<uint8_t> constant_alpha_, varies_;
+  // Cameras nearly always stand still: their planes are kept twice only once one moves.
+  PlaneSlots untouched_;
+  std::vector<Pose> poses_;
 };
 
 }  // namespace qdmd

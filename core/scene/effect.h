@@ -61,6 +61,7 @@ struct FrameState {
   Plane coverage;                   // 255 where an object covers the whole pixel
   Plane shadow;                     // 255 where an object changes the ground
   double shift_x = 0, shift_y = 0;  // pixels by which the frame looks beside its place
+  double turn = 0;                  // radians by which it is turned clockwise around its middle
   Light light;
 
   bool wants(Wanted what) const { return (wanted & what) != 0; }
@@ -90,8 +91,8 @@ struct Plan {
 class Effect {
  public:
   virtual ~Effect() = default;
-  // Pixels that it needs around the frame.
-  virtual int margin() const { return 0; }
+  // Pixels that it needs around a frame of that size.
+  virtual int margin(int /*width*/, int /*height*/) const { return 0; }
 
   virtual void plan(Plan&) {}
   virtual void world(FrameState&) {}

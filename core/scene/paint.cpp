@@ -37,6 +37,33 @@ void crop_raster(const Raster<kSamples>& canvas, double left, double top, Raster
   }
 }
 
+template <int kSamples, unsigned kRound>
+void crop_turned_raster(const Raster<kSamples>& canvas, double left, double top, double turn,
+                        Raster<kSamples>* frame) {
+  const double middle_x = (frame->width - 1) / 2.0, middle_y = (frame->height - 1) / 2.0;
+  const double cosine = std::cos(turn), sine = std::sin(turn);
+  for (int row = 0; row < frame->height; ++row)
+    for (int col = 0; col < frame->width; ++col) {
+      const double u = col - middle_x, v = row - middle_y;
+      const double at_x = left + middle_x + cosine * u - sine * v;
+      const double at_y = top + middle_y + sine * u + cosine * v;
+      const auto x = static_cast<int>(std::lround(std::clamp(at_x, 0.0, canvas.width - 1.0) * 256));
+      const auto y =
+          static_cast<int>(std::lround(std::clamp(at_y, 0.0, canvas.height - 1.0) * 256));
+      const int x0 = x >> 8, y0 = y >> 8;
+      const int x1 = std::min(x0 + 1, canvas.width - 1), y1 = std::min(y0 + 1, canvas.height - 1);
+      const auto right = static_cast<unsigned>(x & 255), lower = static_cast<unsigned>(y & 255);
+      const uint8_t *a = canvas.at(x0, y0), *b = canvas.at(x1, y0);
+      const uint8_t *c = canvas.at(x0, y1), *d = canvas.at(x1, y1);
+      uint8_t* out = frame->at(col, row);
+      for (int i = 0; i < kSamples; ++i)
+        out[i] = static_cast<uint8_t>(((256 - right) * (256 - lower) * a[i] +
+                                       right * (256 - lower) * b[i] + (256 - right) * lower * c[i] +
+                                       right * lower * d[i] + kRound) >>
+                                      16);
+    }
+}
+
 using Curve = std::array<uint8_t, 256>;
 
 Curve curve(double gain) {
@@ -68,6 +95,14 @@ void crop(const Picture& canvas, double left, double top, Picture* frame) {
 
 void crop(const Plane& canvas, double left, double top, Plane* frame) {
   crop_raster<1, 65535>(canvas, left, top, frame);
+}
+
+void crop_turned(const Picture& canvas, double left, double top, double turn, Picture* frame) {
+  crop_turned_raster<3, 32768>(canvas, left, top, turn, frame);
+}
+
+void crop_turned(const Plane& canvas, double left, double top, double turn, Plane* frame) {
+  crop_turned_raster<1, 65535>(canvas, left, top, turn, frame);
 }
 
 void apply(const Light& light, Picture* picture) {

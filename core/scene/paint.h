@@ -45,6 +45,9 @@ void repeat_over_canvas(const FrameState& state, double x, double y, double widt
 void crop(const Picture& canvas, double left, double top, Picture* frame);
 // The same, rounded up, so that a pixel that an object touches at all is not 0.
 void crop(const Plane& canvas, double left, double top, Plane* frame);
+// The same where the frame is turned clockwise around its middle, by `turn` radians.
+void crop_turned(const Picture& canvas, double left, double top, double turn, Picture* frame);
+void crop_turned(const Plane& canvas, double left, double top, double turn, Plane* frame);
 
 void apply(const Light& light, Picture* picture);
 

@@ -20,6 +20,26 @@ void check(const SceneOptions& options) {
         "of the caps.");
 }
 
+struct Corners {
+  double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
+};
+
+// Of a box of the world in the frame, before it is cut off.
+Corners seen_corners(const Box& box, const FrameState& state) {
+  const double middle_x = (state.width - 1) / 2.0, middle_y = (state.height - 1) / 2.0;
+  const double cosine = std::cos(state.turn), sine = std::sin(state.turn);
+  Corners seen;
+  for (const double x : {double(box.x), double(box.right())})
+    for (const double y : {double(box.y), double(box.bottom())}) {
+      const double u = x - state.shift_x - middle_x, v = y - state.shift_y - middle_y;
+      const double at_x = state.turn == 0 ? x - state.shift_x : middle_x + cosine * u + sine * v;
+      const double at_y = state.turn == 0 ? y - state.shift_y : middle_y - sine * u + cosine * v;
+      seen = {std::min(seen.left, at_x), std::min(seen.top, at_y), std::max(seen.right, at_x),
+              std::max(seen.bottom, at_y)};
+    }
+  return seen;
+}
+
 }  // namespace
 
 Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
@@ -31,7 +51,7 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
   int margin = 0;
   for (const NamedEffect& effect : named) {
     effects_.push_back(effect.info->make(effect.values, streams(effect.info->name)));
-    margin += effects_.back()->margin();
+    margin += effects_.back()->margin(options.width, options.height);
   }
   backdrop_ =
       std::make_unique<Backdrop>(options.width, options.height, margin, streams("backdrop"));
@@ -142,11 +162,11 @@ void Scene::find_boxes() {
   boxes_.clear();
   for (const Placement& placement : placements_) {
     if (placement.part_of_background) continue;
-    const Box whole = placement.box();
-    const int left = static_cast<int>(std::floor(whole.x - state_.shift_x));
-    const int top = static_cast<int>(std::floor(whole.y - state_.shift_y));
-    const int right = static_cast<int>(std::ceil(whole.right() - state_.shift_x));
-    const int bottom = static_cast<int>(std::ceil(whole.bottom() - state_.shift_y));
+    const Corners whole = seen_corners(placement.box(), state_);
+    const int left = static_cast<int>(std::floor(whole.left));
+    const int top = static_cast<int>(std::floor(whole.top));
+    const int right = static_cast<int>(std::ceil(whole.right));
+    const int bottom = static_cast<int>(std::ceil(whole.bottom));
     const Box seen =
         intersection({left, top, right - left, bottom - top}, {0, 0, state_.width, state_.height});
     if (!seen.empty()) boxes_.push_back(seen);
@@ -157,7 +177,10 @@ void Scene::crop_to_frame() {
   const double left = state_.margin + state_.shift_x, top = state_.margin + state_.shift_y;
   const auto cut = [&](auto* canvas, auto* frame) {
     frame->resize(state_.width, state_.height);
-    crop(*canvas, left, top, frame);
+    if (state_.turn != 0)
+      crop_turned(*canvas, left, top, state_.turn, frame);
+    else
+      crop(*canvas, left, top, frame);
     std::swap(*canvas, *frame);
   };
   if (state_.wants(kFrame)) cut(&state_.picture, &cropped_);
@@ -172,7 +195,7 @@ void Scene::render(int64_t index, unsigned wanted) {
   state_.index = index;
   state_.wanted = wanted;
   state_.time = static_cast<double>(index) * (plan_.pace > 0 ? plan_.pace : plan_.interval);
-  state_.shift_x = state_.shift_y = 0;
+  state_.shift_x = state_.shift_y = state_.turn = 0;
 
   place(state_.time);
   paint_world();

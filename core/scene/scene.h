@@ -52,9 +52,12 @@ class Scene {
   // Of every object of which some pixel may be in the frame, without the blur of lens and shutter.
   const std::vector<Box>& boxes() const { return boxes_; }
   const Light& light() const { return state_.light; }
-  // Pixels by which the camera looks to the right and down of its place.
+  // Pixels by which the camera looks to the right and down of its place, and radians by which it is
+  // turned clockwise around the middle of the frame: the frame's pixel (x, y) shows the world at
+  // middle + shift + R(turn) ((x, y) - middle), the middle being ((width - 1) / 2, ..).
   double shift_x() const { return state_.shift_x; }
   double shift_y() const { return state_.shift_y; }
+  double turn() const { return state_.turn; }
 
  private:
   struct Stages {

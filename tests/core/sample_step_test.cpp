@@ -206,7 +206,7 @@ TEST(SampleStep, BytesOfTheFrames) {
   auto options = window_of(10);
   // Planes are padded to 64 bytes; each frame has two bytes that say what its alpha is.
   const auto frames = [](int count, uint64_t samples) {
-    return uint64_t(count) * (3 * samples + 2);
+    return uint64_t(count) * (3 * samples + 2 + sizeof(Pose));
   };
   EXPECT_EQ(layout_of(options, 640, 480).store_bytes, frames(10, 640 * 480));
   EXPECT_EQ(layout_of(options, 640, 480).capacity, 10);

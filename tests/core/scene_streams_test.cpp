@@ -187,7 +187,7 @@ TEST(SceneIndependence, OnlyEffectsThatNeedAWarpEnlargeTheCanvas) {
     std::vector<double> values;
     for (const auto& parameter : info->parameters) values.push_back(parameter.standard);
     const auto effect = info->make(values, StreamSource(1, info->name));
-    EXPECT_EQ(effect->margin() > 0, (info->needs & scene::kWarp) != 0) << info->name;
+    EXPECT_EQ(effect->margin(320, 240) > 0, (info->needs & scene::kWarp) != 0) << info->name;
   }
 }
 

@@ -11,10 +11,10 @@ class Defocus : public Effect {
   Defocus(Values values, const StreamSource&) : deviation_(values[0]) {}
 
   // Where the Gaussian is cut off.
-  int margin() const override { return static_cast<int>(std::ceil(3 * deviation_)); }
+  int margin(int, int) const override { return reach(); }
 
   void lens(FrameState& state) override {
-    if (margin() == 0) return;
+    if (reach() == 0) return;
     if (state.wants(kFrame)) blur(&state.picture);
     if (state.wants(kTruth)) blur(&state.truth);
     if (!state.wants(kLabels)) return;
@@ -23,6 +23,8 @@ class Defocus : public Effect {
   }
 
  private:
+  int reach() const { return static_cast<int>(std::ceil(3 * deviation_)); }
+
   template <int kSamples>
   static cv::Mat matrix(Raster<kSamples>* raster) {
     return cv::Mat(raster->height, raster->width, CV_8UC(kSamples), raster->samples.data());
@@ -30,14 +32,14 @@ class Defocus : public Effect {
 
   template <int kSamples>
   void blur(Raster<kSamples>* raster) const {
-    const int side = 2 * margin() + 1;
+    const int side = 2 * reach() + 1;
     cv::Mat samples = matrix(raster);
     cv::GaussianBlur(samples, samples, {side, side}, deviation_, deviation_, cv::BORDER_REPLICATE);
   }
 
   // A pixel to which an object gives any light is not background, however little it is.
   void blur_plane(Plane* plane) {
-    const int side = 2 * margin() + 1;
+    const int side = 2 * reach() + 1;
     cv::dilate(matrix(plane), touched_, cv::Mat::ones(side, side, CV_8U));
     blur(plane);
     cv::Mat samples = matrix(plane);

@@ -15,7 +15,7 @@ class Water : public Effect {
       : amplitude_(values[0]), frequency_(values[1]), streams_(streams) {}
 
   // Waves show what is beside the frame.
-  int margin() const override { return static_cast<int>(std::ceil(2 * amplitude_)); }
+  int margin(int, int) const override { return static_cast<int>(std::ceil(2 * amplitude_)); }
 
   void plan(Plan& plan) override {
     backdrop_ = plan.backdrop;

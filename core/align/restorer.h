@@ -1,0 +1,48 @@
+// From the canvas back to where a frame's camera looked.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/align/resampler.h"
+#include "core/base/channels.h"
+#include "core/model/background_model.h"
+
+namespace qdmd {
+
+// Pictures of one frame. What the canvas does not know of it is the frame itself, and no
+// foreground.
+class Restorer {
+ public:
+  // Takes all memory. For frames of width x height pixels.
+  Restorer(int width, int height);
+  static uint64_t bytes(int width, int height);
+
+  // Takes a background's picture as it is on the canvas, which is `pixels` large.
+  void write_canvas(const BackgroundModel& model, size_t pixels);
+  const uint8_t* canvas(int channel) const { return canvas_[static_cast<size_t>(channel)].data(); }
+  // The same picture seen from `pose`; frame: the frame's own planes.
+  void restore_level(const Pose& pose, const uint8_t* const frame[3], Resampler* resampler,
+                     Pool* pool);
+  const uint8_t* level(int channel) const { return level_[static_cast<size_t>(channel)].data(); }
+
+  // A mask on the canvas, of 255 and 0 where it is hard, seen from `pose`.
+  uint8_t* restore_mask(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
+                        Pool* pool) {
+    return restore(pose, mask, hard, resampler, pool, &mask_);
+  }
+  // The same of a second one.
+  uint8_t* restore_shaded(const Pose& pose, const uint8_t* shaded, Resampler* resampler,
+                          Pool* pool) {
+    return restore(pose, shaded, true, resampler, pool, &shaded_);
+  }
+
+ private:
+  uint8_t* restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
+                   Pool* pool, std::vector<uint8_t>* out);
+
+  int width_, height_;
+  std::vector<uint8_t> canvas_[kChannels], level_[kChannels], mask_, shaded_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,42 @@
+#include "core/engine/schedule.h"
+
+namespace qdmd {
+namespace {
+
+// Frames between backgrounds that frames are compared with: they hardly change.
+constexpr int64_t kReferenceFrames = 50;
+
+}  // namespace
+
+bool Schedule::take(const ImageView& frame) {
+  if (!frames().append(frame)) return false;
+  Stabilizer* const stabilizer = stage_.stabilizer;
+  if (!stabilizer || no_room_) return true;
+  const IgnoredAreas& ignored = background().wishes().ignored;
+  if (background().known() && background().solves() != referred_to_ &&
+      (referred_to_ == 0 || stabilizer->frames_since_reference() >= kReferenceFrames)) {
+    referred_to_ = background().solves();
+    show_newest();
+    stage_.restorer->write_canvas(background().model(), frames().window().pixels());
+    stabilizer->refer_to(stage_.restorer->canvas(stabilizer->channel()), ignored);
+  }
+  const PlaneSlots& planes = frames().window();
+  const int slot = frames().window().newest_slot(), channel = stabilizer->channel();
+  const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
+  if (!pose.is_rest())
+    no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());
+  if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
+  return true;
+}
+
+// Frames before the newest, where they are still looked at and nothing was made of them yet.
+void Schedule::move_canvas(const Pose& to) {
+  if (!holds_frames() || !background().learner().in_one_piece() || no_room_) return;
+  wait();
+  for (int i = 0; i + 1 < frames().size() && !no_room_; ++i) {
+    const Pose pose = compose(inverse(to), frames().pose(frames().slot(i)));
+    no_room_ = !frames().steady(i, pose, &stage_.stabilizer->resampler(), &workers().pool());
+  }
+}
+
+}  // namespace qdmd
