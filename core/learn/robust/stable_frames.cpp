@@ -19,7 +19,7 @@ constexpr int kProposals = 64;
 
 // A frame shows the background where its patch is as near to the background's as kNear times the
 // nearest twentieth, or as half the distance at which patches are alike.
-constexpr float kNear = 3;
+constexpr float kNear = 3.5f;
 constexpr double kNearest = 0.05;
 
 // The picture that takes each cell from the frame `from`.
