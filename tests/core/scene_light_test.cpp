@@ -290,7 +290,7 @@ TEST(SceneDefocus, AnEdgeSpreadsByTheDeviation) {
       // From the filters' radii the variance comes in steps of 2 (r + 1) / 3, with r <= deviation;
       // three roundings of half a level weigh twice their distance from the edge, as far as the
       // margin.
-      const double reach = effect->margin();
+      const double reach = effect->margin(kSide, kSide);
       const double rounding = 3 * 0.5 / 240 * reach * (reach + 1) * 2;
       const double variance = second / weight - first * first;
       EXPECT_NEAR(variance, deviation * deviation, (deviation + 1) / 3 + rounding) << deviation;
