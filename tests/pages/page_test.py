@@ -86,5 +86,19 @@ class Pages(unittest.TestCase):
             if path.name != 'README.md':
                 self.assertIn(f']({path.name})', index)
 
+    def test_readme_has_the_figures_of_the_pages(self):
+        made = subprocess.run([sys.executable, ROOT / 'tests/pages/readme_page.py', ROOT / 'docs'],
+                              capture_output=True, text=True, check=True).stdout
+        self.assertEqual(page.block(ROOT / 'README.md', 'figures'), made.strip(),
+                         'run tests/pages/readme.sh')
+
+    def test_readme_is_short_and_its_links_lead_somewhere(self):
+        text = (ROOT / 'README.md').read_text(encoding='utf-8')
+        self.assertLessEqual(len(text.split()), 900)
+        links = re.findall(r'\]\(([^)#:]+)', text)
+        self.assertGreater(len(links), 5)
+        for link in links:
+            self.assertTrue((ROOT / link).exists(), link)
+
 
 unittest.main()
