@@ -155,6 +155,15 @@ std::optional<double> first_order_sensitivity(const SolvedWindow& solved) {
   return with_own_movement(modes, mean);
 }
 
+// True where an eigenvalue that is zero but for rounding may be background: what its logarithm is,
+// and its mode's amplitude, other digits would decide. Of a Jordan block, rounding leaves the root
+// of epsilon.
+bool rounding_may_be_background(const SolvedWindow& solved) {
+  const auto size = solved.modes.eigenvalues.cwiseAbs().eval();
+  const double zero = std::sqrt(std::numeric_limits<double>::epsilon()) * size.maxCoeff();
+  return size.minCoeff() <= zero && solved.options.omega_threshold >= -std::log(zero);
+}
+
 }  // namespace
 
 QuaternionMatrixd shares_at(const BackgroundModes& modes, double t) {
@@ -202,7 +211,7 @@ double rounding_bound(const SolvedWindow& solved) {
   const Index m = gram.cols();
   if (modes.eigenvalues.size() == 0) return 0;
   // Where the tolerance would be met by other digits, nobody knows.
-  if (modes.selection.dependent) return kInfinity;
+  if (modes.selection.dependent || rounding_may_be_background(solved)) return kInfinity;
   if (const auto bound = first_order_bound(solved)) return *bound;
   const Push push = rounding_push(solved);
   BackgroundDistance moved_by;
