@@ -273,6 +273,10 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
     if (masked) decide_next(&task);
+    if (decided_ && !masked) {
+      background_->decision().level(0, task.level);
+      task.level_stride = background_->decision().level_stride();
+    }
     if (masked && options_.mask_softness > 0) soften(levels, &task);
     const int height = frames_.height(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
