@@ -122,7 +122,8 @@ class SeparateState : public qdmd::State {
     bool wants = false;
     each([&](GstQdmdOutlet* outlet) {
       const Output output = qdmd::output_of(outlet);
-      wants |= output == Output::mask || output == Output::cutout;
+      wants |= (output == Output::mask || output == Output::cutout) &&
+               gst_pad_is_linked(GST_PAD(outlet));
     });
     return wants;
   }
