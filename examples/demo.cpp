@@ -82,14 +82,11 @@ bool parse(int argc, char** argv, Options* options) {
   return good;
 }
 
-// Four branches of one decoded video meet again in a 2 x 2 grid. The input's branch must hold all
-// that the windows hold back, so its queue has no limit. No sink waits for its first buffer
-// (async=false): the encoder wants many frames before it gives one, while another sink would block.
+// The decoded video and three pictures of one separator meet again in a 2 x 2 grid. The input's
+// branch must hold all that the window holds back, so its queue has no limit. No sink waits for its
+// first buffer (async=false): the encoder wants many frames before it gives one, while another sink
+// would block.
 std::string pipeline_text(const Options& options) {
-  const std::string separate =
-      "t. ! queue max-size-buffers=4 max-size-bytes=0 max-size-time=0 ! qdmdbackground "
-      "window-size=" +
-      std::to_string(options.window_size) + " output=";
   const std::string short_queue = " ! queue max-size-buffers=8 max-size-bytes=0 max-size-time=0 ";
   std::string labels;
   for (const char* title : kTitles)
@@ -103,10 +100,13 @@ std::string pipeline_text(const Options& options) {
       "videoconvert ! videoscale ! video/x-raw,format=RGBx,pixel-aspect-ratio=1/1 ! tee name=t "
       "t. ! queue max-size-buffers=0 max-size-bytes=0 max-size-time=0 ! grid.sink_0 ";
   text +=
-      separate + "background ! tee name=b b." + short_queue + "! grid.sink_1 b." + short_queue +
+      "t. ! queue max-size-buffers=4 max-size-bytes=0 max-size-time=0 ! qdmdseparate name=s "
+      "window-size=" +
+      std::to_string(options.window_size) + " s.background ! tee name=b b." + short_queue +
+      "! grid.sink_1 b." + short_queue +
       "! appsink name=background sync=false async=false max-buffers=1 drop=true wait-on-eos=false ";
-  text += separate + "foreground" + short_queue + "! grid.sink_2 ";
-  text += separate + "mask" + short_queue + "! grid.sink_3 ";
+  text += "s.foreground" + short_queue + "! grid.sink_2 ";
+  text += "s.mask" + short_queue + "! grid.sink_3 ";
   text += "compositor name=grid background=black ! video/x-raw,format=RGBx ! tee name=g g." +
           short_queue + "! appsink name=grids sync=false async=false max-buffers=8 g." +
           short_queue + "! videoconvert" + labels +

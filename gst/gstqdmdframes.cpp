@@ -4,6 +4,7 @@
 #include <cmath>
 #include <exception>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "gst/gstqdmdareas.h"
@@ -24,7 +25,7 @@ constexpr int kMostGapFrames = 5;
 }  // namespace
 
 // Posts what a refused engine call said. Called without locks.
-static void post_status(GstQdmdBackground* self, const Status& status) {
+static void post_status(GstElement* self, const Status& status) {
   switch (status.code) {
     case Status::Code::too_much_memory:
       GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("%s", status.message.c_str()), (nullptr));
@@ -41,13 +42,13 @@ static void post_status(GstQdmdBackground* self, const Status& status) {
 // Runs `action` (returning Status) with the engine lock; true if it succeeded, else an error is
 // posted. No exception gets past this.
 template <typename Action>
-static bool with_engine(GstQdmdBackground* self, Action action) {
+static bool with_engine(GstElement* self, Action action) {
   Status status;
   bool no_memory = false;
   gchar* what = nullptr;
   try {
-    const std::lock_guard lock(self->state->engine_lock);
-    status = action(self->state->engine);
+    const std::lock_guard lock(state_of(self)->engine_lock);
+    status = action(state_of(self)->engine);
   } catch (const std::bad_alloc&) {
     no_memory = true;
   } catch (const std::exception& error) {
@@ -71,8 +72,8 @@ static bool with_engine(GstQdmdBackground* self, Action action) {
 }
 
 // Forgets what waits, and where time is.
-static void forget_frames(GstQdmdBackground* self) {
-  State* state = self->state;
+static void forget_frames(GstElement* self) {
+  State* state = state_of(self);
   state->shells.clear();
   GST_OBJECT_LOCK(self);
   state->latency.restart();
@@ -80,17 +81,17 @@ static void forget_frames(GstQdmdBackground* self) {
   state->next_pts = GST_CLOCK_TIME_NONE;
 }
 
-void drop_frames(GstQdmdBackground* self) {
-  State* state = self->state;
+void drop_frames(GstElement* self) {
+  State* state = state_of(self);
   const std::lock_guard lock(state->engine_lock);
   state->background.keep(state->engine);
   state->engine.flush();
   forget_frames(self);
 }
 
-void close(GstQdmdBackground* self) {
+void close(GstElement* self) {
   drop_frames(self);
-  State* state = self->state;
+  State* state = state_of(self);
   state->mask = {};
   state->residual = {};
   state->regions = {};
@@ -99,8 +100,8 @@ void close(GstQdmdBackground* self) {
 }
 
 // Copies what others may want to know of the engine.
-static void publish_report(GstQdmdBackground* self, guint64 frames_in, guint64 frames_out) {
-  State* state = self->state;
+static void publish_report(GstElement* self, guint64 frames_in, guint64 frames_out) {
+  State* state = state_of(self);
   const Engine& engine = state->engine;
   GST_OBJECT_LOCK(self);
   state->counters.frames_in += frames_in;
@@ -134,16 +135,16 @@ static FrameTime time_of_solve(const State& state, GstBuffer* leaving) {
 
 // After a call that may bring a background into use, with the engine lock: the property's picture
 // and its time belong together.
-static void note_solve(GstQdmdBackground* self, GstBuffer* leaving) {
-  State* state = self->state;
+static void note_solve(GstElement* self, GstBuffer* leaving) {
+  State* state = state_of(self);
   if (state->engine.solves() == state->solves_told) return;
   const FrameTime time = time_of_solve(*state, leaving);
-  state->background.solved(GST_BASE_TRANSFORM(self)->segment, time.timestamp, time.duration);
+  state->background.solved(*state->segment, time.timestamp, time.duration);
 }
 
 // Says what a new solve found.
-static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
-  State* state = self->state;
+static void tell_of_solve(GstElement* self, GstBuffer* leaving) {
+  State* state = state_of(self);
   const guint64 solves = state->engine.solves() - state->solves_told;
   if (solves == 0) return;
   state->solves_told += solves;
@@ -155,23 +156,22 @@ static void tell_of_solve(GstQdmdBackground* self, GstBuffer* leaving) {
   if (!post) return;
   const FrameTime time = time_of_solve(*state, leaving);
   gst_element_post_message(
-      GST_ELEMENT(self), gst_message_new_element(
-                             GST_OBJECT(self), make_solve_message(state->engine.report(), counters,
-                                                                  GST_BASE_TRANSFORM(self)->segment,
-                                                                  time.timestamp, time.duration)));
+      self,
+      gst_message_new_element(GST_OBJECT(self),
+                              make_solve_message(state->engine.report(), counters, *state->segment,
+                                                 time.timestamp, time.duration)));
 }
 
 // Says that the frame of that time, or one a few frames before it, began another scene.
-static void tell_of_scene(GstQdmdBackground* self, GstClockTime timestamp) {
-  State* state = self->state;
+static void tell_of_scene(GstElement* self, GstClockTime timestamp) {
+  State* state = state_of(self);
   const guint64 scenes = state->engine.scenes(), views = state->engine.views();
   if (scenes > state->scenes_told) {
     GST_INFO_OBJECT(self, "another scene: learning begins anew");
     gst_element_post_message(
-        GST_ELEMENT(self),
-        gst_message_new_element(GST_OBJECT(self),
-                                make_scene_message(GST_BASE_TRANSFORM(self)->segment, timestamp,
-                                                   views > state->views_told)));
+        self,
+        gst_message_new_element(GST_OBJECT(self), make_scene_message(*state->segment, timestamp,
+                                                                     views > state->views_told)));
   }
   // An engine that is configured anew counts anew.
   state->scenes_told = scenes;
@@ -179,8 +179,8 @@ static void tell_of_scene(GstQdmdBackground* self, GstClockTime timestamp) {
 }
 
 // Says where the camera looked in a frame that leaves, as long as it moves.
-static void tell_of_camera(GstQdmdBackground* self, const Pose& pose, GstClockTime timestamp) {
-  State* state = self->state;
+static void tell_of_camera(GstElement* self, const Pose& pose, GstClockTime timestamp) {
+  State* state = state_of(self);
   const bool moves = !pose.is_rest() || state->camera_moved;
   state->camera_moved = !pose.is_rest();
   if (!moves) return;
@@ -189,15 +189,13 @@ static void tell_of_camera(GstQdmdBackground* self, const Pose& pose, GstClockTi
   GST_OBJECT_UNLOCK(self);
   if (!post) return;
   gst_element_post_message(
-      GST_ELEMENT(self),
-      gst_message_new_element(
-          GST_OBJECT(self),
-          make_camera_message(GST_BASE_TRANSFORM(self)->segment, timestamp, pose)));
+      self, gst_message_new_element(GST_OBJECT(self),
+                                    make_camera_message(*state->segment, timestamp, pose)));
 }
 
 // Says once that frames cannot be moved.
-static void warn_of_no_room(GstQdmdBackground* self) {
-  State* state = self->state;
+static void warn_of_no_room(GstElement* self) {
+  State* state = state_of(self);
   if (!state->engine.has_no_room_for_motion() || std::exchange(state->warned_of_no_room, true))
     return;
   GST_ELEMENT_WARNING(
@@ -209,8 +207,8 @@ static void warn_of_no_room(GstQdmdBackground* self) {
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
-static void follow_controllers(GstQdmdBackground* self, GstBuffer* buffer) {
-  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+static void follow_controllers(GstElement* self, GstBuffer* buffer) {
+  const GstSegment& segment = *state_of(self)->segment;
   if (segment.format != GST_FORMAT_TIME || !GST_BUFFER_PTS_IS_VALID(buffer)) return;
   const guint64 time =
       gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
@@ -225,9 +223,9 @@ static IgnoredAreas ignored_of(const Settings& settings, GstBuffer* buffer) {
 }
 
 // Regions of the frame that comes out next.
-static const std::vector<Region>& next_regions(GstQdmdBackground* self, int least_area) {
-  State* state = self->state;
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->out_info;
+static const std::vector<Region>& next_regions(GstElement* self, int least_area) {
+  State* state = state_of(self);
+  const GstVideoInfo* info = &state->info;
   const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   state->mask.resize(pixels);
@@ -250,10 +248,9 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
   }
 }
 
-GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
-  State* state = self->state;
-  GstBaseTransform* trans = GST_BASE_TRANSFORM(self);
-  *out = nullptr;
+GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
+  State* state = state_of(self);
+  pictures->clear();
   if (!state->engine.ready()) return GST_FLOW_OK;
 
   const BufferPtr shell = state->shells.pop();
@@ -262,11 +259,8 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
 
-  GstBuffer* made = nullptr;
-  const GstFlowReturn flow =
-      GST_BASE_TRANSFORM_GET_CLASS(self)->prepare_output_buffer(trans, shell.get(), &made);
-  BufferPtr buffer(made);
-  if (flow != GST_FLOW_OK || !buffer) {
+  const GstFlowReturn flow = state->make_pictures(shell.get(), settings, pictures);
+  if (flow != GST_FLOW_OK) {
     // Its frame is still in the engine, and nobody wants it.
     drop_frames(self);
     return flow;
@@ -274,8 +268,12 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
   const std::vector<Region>* regions = nullptr;
   Pose pose;
   {
-    MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->out_info, buffer.get(), GST_MAP_WRITE);
-    if (!frame) {
+    std::optional<MappedVideoFrame> frames[Pictures::kMost];
+    size_t mapped = 0;
+    for (const Picture& picture : *pictures) {
+      auto& frame = frames[mapped++];
+      frame.emplace(picture.info, picture.buffer.get(), GST_MAP_WRITE);
+      if (*frame) continue;
       GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
       drop_frames(self);
       return GST_FLOW_ERROR;
@@ -288,8 +286,11 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       engine.set_stabilize_output(settings.stabilize_output);
       engine.set_ignored(ignored_of(settings, shell.get()));
       pose = engine.next_pose();
-      if (settings.regions) regions = &next_regions(self, settings.regions_min_area);
-      engine.pop(settings.output, frame.view<uint8_t>());
+      if (settings.regions && mapped > 0) regions = &next_regions(self, settings.regions_min_area);
+      size_t next = 0;
+      for (const Picture& picture : *pictures)
+        engine.write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
+      engine.skip();
       note_solve(self, shell.get());
       return Status();
     });
@@ -298,16 +299,16 @@ GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out) {
       return GST_FLOW_ERROR;
     }
   }
-  if (regions) attach(buffer.get(), *regions);
+  if (regions)
+    for (const Picture& picture : *pictures) attach(picture.buffer.get(), *regions);
   publish_report(self, 0, 1);
   tell_of_solve(self, shell.get());
   tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
-  *out = buffer.release();
   return GST_FLOW_OK;
 }
 
-GstFlowReturn drain(GstQdmdBackground* self) {
-  State* state = self->state;
+GstFlowReturn drain(GstElement* self) {
+  State* state = state_of(self);
   if (!state->engine.configured()) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
@@ -316,18 +317,20 @@ GstFlowReturn drain(GstQdmdBackground* self) {
     note_solve(self, nullptr);
     return status;
   };
-  if (!with_engine(self, solve)) flow = GST_FLOW_ERROR;
-  if (flow == GST_FLOW_OK) tell_of_solve(self, nullptr);
-  while (flow == GST_FLOW_OK && state->engine.ready()) {
-    GstBuffer* buffer = nullptr;
-    flow = next_output(self, &buffer);
-    if (flow == GST_FLOW_OK && buffer)
-      flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(self), buffer);
+  if (!with_engine(self, solve)) {
+    drop_frames(self);
+    return GST_FLOW_ERROR;
+  }
+  tell_of_solve(self, nullptr);
+  while (state->goes_on(flow) && state->engine.ready()) {
+    Pictures pictures;
+    flow = next_pictures(self, &pictures);
+    if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }
   GST_OBJECT_LOCK(self);
   state->latency.restart();
   GST_OBJECT_UNLOCK(self);
-  if (flow == GST_FLOW_OK) return flow;
+  if (state->goes_on(flow)) return flow;
   GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(state->shells.size()),
                    gst_flow_get_name(flow));
   drop_frames(self);
@@ -340,9 +343,10 @@ enum class Step {
   jump        // back, or on by more than a camera loses
 };
 // From the frame before to `input`. Notes where the next frame is expected.
-static Step step_to(GstQdmdBackground* self, GstBuffer* input) {
-  GstClockTime* next = &self->state->next_pts;
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
+static Step step_to(GstElement* self, GstBuffer* input) {
+  State* state = state_of(self);
+  GstClockTime* next = &state->next_pts;
+  const GstVideoInfo* info = &state->info;
   const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
   const bool has_rate = GST_VIDEO_INFO_FPS_N(info) > 0;
   GstClockTime frame = GST_BUFFER_DURATION(input);
@@ -352,7 +356,7 @@ static Step step_to(GstQdmdBackground* self, GstBuffer* input) {
   *next = GST_CLOCK_TIME_NONE;
   if (!GST_CLOCK_TIME_IS_VALID(pts)) return Step::onwards;
   if (!GST_CLOCK_TIME_IS_VALID(frame)) frame = 0;
-  if (GST_BASE_TRANSFORM(self)->segment.rate < 0) {
+  if (state->segment->rate < 0) {
     // Frames come in reverse order.
     *next = pts;
     const bool meets = GST_CLOCK_TIME_IS_VALID(expected) &&
@@ -369,20 +373,20 @@ static Step step_to(GstQdmdBackground* self, GstBuffer* input) {
 }
 
 // Warns once of each property that was set and has no effect with this method.
-static void warn_of_settings_without_effect(GstQdmdBackground* self, const Settings& settings) {
+static void warn_of_settings_without_effect(GstElement* self, const Settings& settings) {
   for (const char* name : options_without_effect(settings.engine.method)) {
     const guint id = g_object_class_find_property(G_OBJECT_GET_CLASS(self), name)->param_id;
     const guint bit = 1u << id;
-    if (!(settings.asked & bit) || (self->state->warned & bit)) continue;
-    self->state->warned |= bit;
+    if (!(settings.asked & bit) || (state_of(self)->warned & bit)) continue;
+    state_of(self)->warned |= bit;
     GST_WARNING_OBJECT(self, "method=%s does not look at %s: it has no effect",
                        method_name(settings.engine.method), name);
   }
 }
 
 // Frames that stand alone make no window: says so once.
-static void warn_of_breaks(GstQdmdBackground* self, bool jump) {
-  State* state = self->state;
+static void warn_of_breaks(GstElement* self, bool jump) {
+  State* state = state_of(self);
   constexpr guint kMany = 3;
   state->breaks = jump ? state->breaks + 1 : 0;
   if (state->breaks < kMany || std::exchange(state->warned_of_breaks, true)) return;
@@ -395,11 +399,12 @@ static void warn_of_breaks(GstQdmdBackground* self, bool jump) {
       (nullptr));
 }
 
-bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideoInfo& info,
+bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& info,
                GstCaps* caps) {
-  State* state = self->state;
+  State* state = state_of(self);
   warn_of_settings_without_effect(self, settings);
   forget_frames(self);
+  state->info = info;
   state->solves_told = 0;
   EngineOptions options = settings.engine;
   options.colours = colours_of(info);
@@ -422,10 +427,10 @@ bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideo
   return configured && apply_loaded(self);
 }
 
-GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
+GstFlowReturn prepare_for(GstElement* self, GstBuffer* input) {
   follow_controllers(self, input);
   GST_OBJECT_LOCK(self);
-  const bool reset = std::exchange(self->state->reset_asked, false);
+  const bool reset = std::exchange(state_of(self)->reset_asked, false);
   GST_OBJECT_UNLOCK(self);
   const Step step = step_to(self, input);
   const bool jump = step == Step::jump;
@@ -437,7 +442,7 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
   const bool discont = GST_BUFFER_IS_DISCONT(input) && step != Step::backwards;
   if (discont || jump || reset) {
     const GstFlowReturn flow = drain(self);
-    if (flow != GST_FLOW_OK) return flow;
+    if (!state_of(self)->goes_on(flow)) return flow;
   }
   if (reset) {
     drop_frames(self);
@@ -448,16 +453,16 @@ GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input) {
 }
 
 // Of the clock that sinks go by; before there is one, of the system's.
-static GstClockTime time_now(GstQdmdBackground* self) {
-  ClockPtr clock(gst_element_get_clock(GST_ELEMENT(self)));
+static GstClockTime time_now(GstElement* self) {
+  ClockPtr clock(gst_element_get_clock(self));
   if (!clock) clock.reset(gst_system_clock_obtain());
   return gst_clock_get_time(clock.get());
 }
 
 // After a frame that came at the time `came`: whether the next to leave waits longer than sinks
 // were told.
-static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, GstClockTime came) {
-  State* state = self->state;
+static void follow_latency(GstElement* self, GstClockTime timestamp, GstClockTime came) {
+  State* state = state_of(self);
   const GstClockTime now = state->engine.held_up() ? time_now(self) : came,
                      held = now > came ? now - came : 0;
   GST_OBJECT_LOCK(self);
@@ -469,20 +474,20 @@ static void follow_latency(GstQdmdBackground* self, GstClockTime timestamp, GstC
   GST_OBJECT_UNLOCK(self);
   if (!grew) return;
   GST_INFO_OBJECT(self, "latency is %" GST_TIME_FORMAT " by now", GST_TIME_ARGS(latency));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  gst_element_post_message(self, gst_message_new_latency(GST_OBJECT(self)));
 }
 
 // Of the frames as they come; 0: never.
-static gint64 absorb_frames(GstQdmdBackground* self, double seconds) {
+static gint64 absorb_frames(GstElement* self, double seconds) {
   if (seconds <= 0) return 0;
-  const GstVideoInfo* info = &GST_VIDEO_FILTER(self)->in_info;
-  const double rate =
-      self->state->latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
+  State* state = state_of(self);
+  const GstVideoInfo* info = &state->info;
+  const double rate = state->latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
   return gint64(std::clamp(std::round(seconds * rate), 1.0, 1e12));
 }
 
-GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
-  State* state = self->state;
+GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
+  State* state = state_of(self);
   // The base class asks for frames until there is none, or until downstream refuses one (it has
   // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
   if (state->engine.ready()) drop_frames(self);
@@ -491,15 +496,14 @@ GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer) {
   GST_OBJECT_LOCK(self);
   const Settings settings = state->settings;
   GST_OBJECT_UNLOCK(self);
-  const bool masks =
-      settings.regions || settings.output == Output::mask || settings.output == Output::cutout;
+  const bool masks = settings.regions || state->wants_masks(settings);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
       shell.get(), buffer.get(),
       GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
       0, gsize(-1));
   {
-    const MappedVideoFrame frame(&GST_VIDEO_FILTER(self)->in_info, buffer.get(), GST_MAP_READ);
+    const MappedVideoFrame frame(&state->info, buffer.get(), GST_MAP_READ);
     if (!frame) {
       GST_ELEMENT_ERROR(self, STREAM, FORMAT,
                         ("A buffer does not hold a frame of the negotiated caps."), (nullptr));

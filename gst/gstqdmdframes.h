@@ -1,4 +1,4 @@
-// Frames of qdmdbackground on their way through the engine, with their metadata.
+// Frames of an element on their way through the engine, with their metadata.
 #pragma once
 
 #include "gst/gstqdmdstate.h"
@@ -9,19 +9,19 @@ namespace qdmd {
 // posted.
 
 // Makes the engine ready for frames of `info`. False: an error was posted.
-bool configure(GstQdmdBackground* self, const Settings& settings, const GstVideoInfo& info,
-               GstCaps* caps);
+bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& info, GstCaps* caps);
 // Gives all memory back.
-void close(GstQdmdBackground* self);
+void close(GstElement* self);
 // Drops what waits and forgets the background.
-void drop_frames(GstQdmdBackground* self);
+void drop_frames(GstElement* self);
 // Before a frame: what waits is sent where time breaks or somebody asked for a reset.
-GstFlowReturn prepare_for(GstQdmdBackground* self, GstBuffer* input);
+GstFlowReturn prepare_for(GstElement* self, GstBuffer* input);
 // Takes a frame of the negotiated caps.
-GstFlowReturn take_frame(GstQdmdBackground* self, BufferPtr buffer);
-// The next ready frame as a buffer from the output pool, or null with OK where none is ready.
-GstFlowReturn next_output(GstQdmdBackground* self, GstBuffer** out);
+GstFlowReturn take_frame(GstElement* self, BufferPtr buffer);
+// The pictures that are wanted of the next ready frame, which has left then; none with OK where
+// none is ready.
+GstFlowReturn next_pictures(GstElement* self, Pictures* pictures);
 // Solves for what is left and pushes it; the next frame begins a new window.
-GstFlowReturn drain(GstQdmdBackground* self);
+GstFlowReturn drain(GstElement* self);
 
 }  // namespace qdmd

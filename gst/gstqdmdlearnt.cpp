@@ -93,10 +93,10 @@ Problem write(const gchar* file, const std::vector<uint8_t>& bytes) {
 }
 
 // what: "save .. to" or "load .. of". code: of GST_RESOURCE_ERROR, unless there is no memory.
-void post(GstQdmdBackground* self, GstMessageType type, GstResourceError code, const char* what,
+void post(GstElement* self, GstMessageType type, GstResourceError code, const char* what,
           const gchar* name, const Problem& wrong) {
   if (std::strcmp(wrong.get(), kNoMemory) == 0) code = GST_RESOURCE_ERROR_NO_SPACE_LEFT;
-  gst_element_message_full(GST_ELEMENT(self), type, GST_RESOURCE_ERROR, code,
+  gst_element_message_full(self, type, GST_RESOURCE_ERROR, code,
                            g_strdup_printf("Cannot %s \"%s\": %s", what, name, wrong.get()),
                            nullptr, __FILE__, __func__, __LINE__);
 }
@@ -130,8 +130,8 @@ Colours colours_of(const GstVideoInfo& info) {
   return GST_VIDEO_INFO_IS_GRAY(&info) ? Colours::grey : Colours::rgb;
 }
 
-bool save_learnt(GstQdmdBackground* self, const gchar* file) {
-  State* state = self->state;
+bool save_learnt(GstElement* self, const gchar* file) {
+  State* state = state_of(self);
   const Problem wrong = guarded([&]() -> Problem {
     if (!file || !*file) return problem("give it the name of a file.");
     Learnt learnt;
@@ -155,8 +155,8 @@ bool save_learnt(GstQdmdBackground* self, const gchar* file) {
   return true;
 }
 
-bool load_learnt(GstQdmdBackground* self, const gchar* file) {
-  State* state = self->state;
+bool load_learnt(GstElement* self, const gchar* file) {
+  State* state = state_of(self);
   const Problem wrong = guarded([&]() -> Problem {
     auto loaded = std::make_unique<Loaded>();
     if (Problem unread = read(file, &loaded->learnt)) return unread;
@@ -185,8 +185,8 @@ bool load_learnt(GstQdmdBackground* self, const gchar* file) {
   return true;
 }
 
-bool read_load_location(GstQdmdBackground* self) {
-  State* state = self->state;
+bool read_load_location(GstElement* self) {
+  State* state = state_of(self);
   GST_OBJECT_LOCK(self);
   const CharsPtr location(g_strdup(state->load_location.get()));
   GST_OBJECT_UNLOCK(self);
@@ -211,8 +211,8 @@ bool read_load_location(GstQdmdBackground* self) {
   return false;
 }
 
-bool apply_loaded(GstQdmdBackground* self) {
-  State* state = self->state;
+bool apply_loaded(GstElement* self) {
+  State* state = state_of(self);
   std::unique_ptr<Loaded> loaded;
   const Problem wrong = guarded([&]() -> Problem {
     const std::lock_guard lock(state->engine_lock);

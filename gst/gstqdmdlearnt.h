@@ -8,14 +8,14 @@ namespace qdmd {
 // Calls are without locks. What goes wrong is posted, and changes nothing.
 
 // The signals, from any thread.
-bool save_learnt(GstQdmdBackground* self, const gchar* file);
-bool load_learnt(GstQdmdBackground* self, const gchar* file);
+bool save_learnt(GstElement* self, const gchar* file);
+bool load_learnt(GstElement* self, const gchar* file);
 
 // When the element starts. False: an error was posted.
-bool read_load_location(GstQdmdBackground* self);
+bool read_load_location(GstElement* self);
 // Gives what was loaded to the engine, once that is configured. From the streaming thread. False:
 // an error was posted.
-bool apply_loaded(GstQdmdBackground* self);
+bool apply_loaded(GstElement* self);
 
 // Which of its backgrounds fit.
 Colours colours_of(const GstVideoInfo& info);

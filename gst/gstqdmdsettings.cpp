@@ -1,5 +1,6 @@
 #include "gst/gstqdmdsettings.h"
 
+#include <cstring>
 #include <iterator>
 
 #include "core/passes/soft_edge.h"
@@ -265,12 +266,18 @@ const Property kProperties[] = {
 
 }  // namespace
 
-void install_settings(GObjectClass* klass) {
+void install_settings(GObjectClass* klass, WhichSettings which) {
   static_assert(std::size(kProperties) + 1 == kFirstFreeProperty);
   const Settings defaults;
   guint id = 1;
-  for (const Property& property : kProperties)
-    g_object_class_install_property(klass, id++, property.spec(defaults));
+  for (const Property& property : kProperties) {
+    GParamSpec* spec = property.spec(defaults);
+    if (which == WhichSettings::without_output && std::strcmp(spec->name, "output") == 0)
+      g_param_spec_unref(g_param_spec_ref_sink(spec));
+    else
+      g_object_class_install_property(klass, id, spec);
+    ++id;
+  }
 }
 
 bool set_setting(Settings* settings, guint id, const GValue* value) {

@@ -29,8 +29,9 @@ struct Settings {
   guint asked = 0;  // what somebody has set, a bit for each id
 };
 
+enum class WhichSettings { all, without_output };
 // Installs one property for each setting; their ids are 1 .. kFirstFreeProperty - 1.
-void install_settings(GObjectClass* klass);
+void install_settings(GObjectClass* klass, WhichSettings which);
 inline constexpr guint kFirstFreeProperty = 29;
 static_assert(kFirstFreeProperty <= 32, "Settings::asked has a bit for each");
 

@@ -1,8 +1,9 @@
-// What qdmdbackground keeps from one call to the next.
+// What an element keeps from one call to the next, and what the two elements do differently.
 #pragma once
 
-#include <gst/video/gstvideofilter.h>
+#include <gst/video/video.h>
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -11,7 +12,6 @@
 #include "core/foreground/regions.h"
 #include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
-#include "gst/gstqdmdbackground.h"
 #include "gst/gstqdmdsettings.h"
 #include "gst/latency.h"
 #include "gst/pointers.h"
@@ -26,7 +26,50 @@ struct Loaded {
   bool at_start = false;  // by load-location: the element does not go on without it
 };
 
-struct State {
+// One picture of a frame that leaves, in a buffer with its metadata.
+struct Picture {
+  Output output = Output::background;
+  const GstVideoInfo* info = nullptr;
+  BufferPtr buffer;
+};
+
+// All that are wanted of one frame.
+class Pictures {
+ public:
+  static constexpr size_t kMost = 4;  // one of each kind
+  void clear() {
+    while (size_ > 0) of_[--size_] = {};
+  }
+  void add(Picture picture) { of_[size_++] = std::move(picture); }
+  bool empty() const { return size_ == 0; }
+  Picture* begin() { return of_.data(); }
+  Picture* end() { return of_.data() + size_; }
+
+ private:
+  std::array<Picture, kMost> of_;
+  size_t size_ = 0;
+};
+
+class State {
+ public:
+  // Of this element, whose input has this segment. They live as long as it does.
+  State(GstElement* element, const GstSegment* segment);
+  virtual ~State() = default;
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  // From the streaming thread, with the stream lock and without the others.
+  // Whether somebody is going to ask for masks or cut-outs.
+  virtual bool wants_masks(const Settings& settings) const = 0;
+  // Adds the pictures that somebody wants of the frame that left `shell`, not drawn yet. Not OK:
+  // what waits is dropped.
+  virtual GstFlowReturn make_pictures(GstBuffer* shell, const Settings& settings,
+                                      Pictures* pictures) = 0;
+  // Pushes what is drawn.
+  virtual GstFlowReturn send(Pictures* pictures) = 0;
+  // Somebody takes frames after send() had this flow.
+  virtual bool goes_on(GstFlowReturn flow) const { return flow == GST_FLOW_OK; }
+
   // Protected by the object lock.
   Settings settings;
   Latency latency;  // written with the stream lock, too
@@ -45,6 +88,8 @@ struct State {
   std::unique_ptr<Loaded> loaded;
 
   // Protected by the stream lock.
+  const GstSegment* const segment;  // of what comes in
+  GstVideoInfo info = {};           // of the video that the engine is configured for
   // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
   // upstream's pools never wait for a window.
   BufferQueue shells;
@@ -58,13 +103,7 @@ struct State {
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };
 
-}  // namespace qdmd
+// Of an element that made one.
+State* state_of(GstElement* self);
 
-// What GLib aligns instances to.
-static_assert(alignof(qdmd::State) <= 16);
-struct _GstQdmdBackground {
-  GstVideoFilter parent;
-  // In the instance's own memory: GLib ends the process where it has none.
-  qdmd::State* state;
-  alignas(qdmd::State) unsigned char room_of_state[sizeof(qdmd::State)];
-};
+}  // namespace qdmd

@@ -2,9 +2,10 @@
 #include <gst/gst.h>
 
 #include "gst/gstqdmdbackground.h"
+#include "gst/gstqdmdseparate.h"
 
 static gboolean plugin_init(GstPlugin* plugin) {
-  return GST_ELEMENT_REGISTER(qdmdbackground, plugin);
+  return GST_ELEMENT_REGISTER(qdmdbackground, plugin) && GST_ELEMENT_REGISTER(qdmdseparate, plugin);
 }
 
 GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, qdmd,

@@ -84,7 +84,7 @@ void Engine::close() {
 
 void Engine::flush() {
   queue_ = {};
-  decided_ = false;
+  decided_ = softened_ = false;
   if (schedule_) {
     schedule_->restart();
     background_->forget();
@@ -205,14 +205,16 @@ void Engine::decide_next(OutputTask* task) {
 }
 
 // Once a frame.
-void Engine::soften(OutputTask* task) {
+void Engine::soften(const Levels& levels, OutputTask* task) {
   if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames_.width(), frames_.height());
   const SoftEdge edge = {options_.mask_softness, background_->report().foreground.threshold};
-  soft_mask_->make(background_->decision(), task->x, edge, ignored_,
-                   workers_->side().idle() ? &workers_->pool() : nullptr);
+  if (!softened_)
+    soft_mask_->make(background_->decision(), task->x, edge, ignored_,
+                     workers_->side().idle() ? &workers_->pool() : nullptr);
+  softened_ = true;
   task->mask = soft_mask_->alpha();
   task->soft = true;
-  std::copy_n(options_.levels.black, kChannels, task->black);
+  std::copy_n(levels.black, kChannels, task->black);
 }
 
 Pose Engine::next_pose() const {
@@ -231,6 +233,7 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
     restorer_->write_canvas(*task->model, frames_.window().pixels());
     restorer_->restore_level(pose, task->x, resampler, pool);
     for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
+    task->level_stride = static_cast<size_t>(frames_.width());
   }
   // What is ignored has its place in the frame.
   const auto ignore = [&](uint8_t* mask) {
@@ -301,23 +304,24 @@ Status Engine::learn_from(const Learnt& learnt) {
   return {};
 }
 
-void Engine::pop(Output output, const MutableImageView& out) {
+void Engine::write(Output output, const Levels& levels, const MutableImageView& out) {
   if (!ready()) return;
   const Clock::Span span(clock_, Clock::frames);
   flushed_if_it_throws([&] {
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
     if (masked) decide_next(&task);
-    if (masked && options_.mask_softness > 0)
-      soften(&task);
-    else if (soft_mask_)
-      soft_mask_->forget();
+    if (decided_ && !masked) {
+      background_->decision().level(0, task.level);
+      task.level_stride = background_->decision().level_stride();
+    }
+    if (masked && options_.mask_softness > 0) soften(levels, &task);
     return_to_frame(&task, output == Output::background || output == Output::foreground);
     const int height = frames_.height(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
     const auto write = [&](int first, int count, size_t) {
       const int row = first * together;
-      write_picture(task, options_.levels, out, row, std::min(count * together, height - row));
+      write_picture(task, levels, out, row, std::min(count * together, height - row));
     };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
@@ -328,9 +332,19 @@ void Engine::pop(Output output, const MutableImageView& out) {
       write(0, steps, 0);
     }
   });
+}
+
+void Engine::skip() {
+  if (!ready()) return;
+  if (soft_mask_ && !softened_) soft_mask_->forget();
   --queue_.pending;
   --queue_.ready;
-  decided_ = false;
+  decided_ = softened_ = false;
+}
+
+void Engine::pop(Output output, const MutableImageView& out) {
+  write(output, options_.levels, out);
+  skip();
 }
 
 }  // namespace qdmd

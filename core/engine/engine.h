@@ -39,9 +39,15 @@ class Engine {
   bool held_up() const { return schedule_ && schedule_->held_up(); }
   // True while pop() has a frame.
   bool ready() const { return queue_.ready > 0; }
-  // Writes the next frame's picture. Call only while ready(); `out` has the configured size.
+  // Writes a picture of the next frame, which stays the next: any number of pictures share what is
+  // computed of it. Call only while ready(); `out` has the configured size. Its black, white and
+  // neutral chroma are `levels`: the configured ones, or, of a mask in another format, its own.
+  void write(Output output, const Levels& levels, const MutableImageView& out);
+  // The next frame has left. Call only while ready().
+  void skip();
+  // write() in the configured levels, and skip().
   void pop(Output output, const MutableImageView& out);
-  // Of the frame that pop() gives next, width * height samples each: its mask, as Output::mask has
+  // Of the frame that leaves next, width * height samples each: its mask, as Output::mask has
   // it, and the lengths of its residuals in levels, at most 255. Call only while ready().
   void foreground(uint8_t* mask, uint8_t* residual);
   // Writes the newest background: that of the last frame of a batch that was solved for, or of the
@@ -130,7 +136,7 @@ class Engine {
   OutputTask next_task(Output output);
   void return_to_frame(OutputTask* task, bool level);
   void decide_next(OutputTask* task);
-  void soften(OutputTask* task);
+  void soften(const Levels& levels, OutputTask* task);
   void pass_wishes();
   Status alpha_refused() const;
   template <typename Action>
@@ -152,7 +158,7 @@ class Engine {
   std::unique_ptr<SoftMask> soft_mask_;
   std::unique_ptr<Schedule> schedule_;
   Queue queue_;
-  bool decided_ = false;  // the frame that pop() gives next
+  bool decided_ = false, softened_ = false;  // the frame that leaves next
   // The last member: its threads end before what they work on.
   std::unique_ptr<Workers> workers_;
 };

@@ -68,6 +68,8 @@ class Decision {
   }
   // L of a row in that frame, 3 planes.
   void level(int y, const uint8_t* out[3]) const;
+  // From a row to the next.
+  size_t level_stride() const { return shape_.stride; }
 
  private:
   // The pictures' shape. Rows are `stride` samples apart and have `margin` samples more on both

@@ -91,14 +91,6 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   return statistics;
 }
 
-void OutputTask::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
-  if (!level[0]) {
-    model->evaluate(first, count, out);
-    return;
-  }
-  for (int c = 0; c < kChannels; ++c) std::copy_n(level[c] + first, count, out[c]);
-}
-
 void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
                   int row_count) {
   BackgroundRun background;
@@ -109,23 +101,27 @@ void write_output(const OutputTask& task, const MutableImageView& out, int first
   const auto image_width = static_cast<size_t>(out.width);
   size_t rows = static_cast<size_t>(row_count), width = image_width;
   // Rows without gaps are one long row.
-  if (out.row_stride == out.pixel_stride * out.width) width *= std::exchange(rows, 1);
+  if (!task.level[0] && out.row_stride == out.pixel_stride * out.width)
+    width *= std::exchange(rows, 1);
   for (size_t row = 0; row < rows; ++row)
     for (size_t left = 0; left < width; left += kMaxRun) {
       const size_t count = std::min(kMaxRun, width - left);
       const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
       const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
       const uint8_t* const mask = task.mask ? task.mask + first : nullptr;
-      const uint8_t* channels[3] = {made[0], made[1], made[2]};
+      const uint8_t *channels[3] = {made[0], made[1], made[2]}, *level[3];
+      const auto find_level = [&](const uint8_t* found[3]) {
+        // One long row begins with the first.
+        const size_t y = static_cast<size_t>(first_row) + row;
+        task.find_level(y, left, count, image_width, background.rows, found);
+      };
       switch (task.output) {
         case Output::background:
-          task.evaluate(first, count, background.rows);
-          std::copy_n(background.rows, kChannels, channels);
+          find_level(channels);
           break;
         case Output::foreground:
-          task.evaluate(first, count, background.rows);
-          for (int c = 0; c < kChannels; ++c)
-            absolute_residual(x[c], background.level[c], count, made[c]);
+          find_level(level);
+          for (int c = 0; c < kChannels; ++c) absolute_residual(x[c], level[c], count, made[c]);
           break;
         case Output::mask:
           std::fill_n(channels, kChannels, mask);

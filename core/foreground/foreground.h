@@ -49,11 +49,19 @@ struct OutputTask {
   bool soft = false;       // the mask
   // Samples of black.
   uint8_t black[3] = {0, 0, 0};
-  // L, in place of the model's; or null.
+  // L at that time, where somebody has made it, in rows that are `level_stride` samples apart; or
+  // nulls.
   const uint8_t* level[3] = {nullptr, nullptr, nullptr};
+  size_t level_stride = 0;
 
-  // L at pixels first .. first + count - 1 (BackgroundModel::evaluate).
-  void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
+  // L of pixels left .. left + count - 1 of a row, of `width` pixels, made in `room` where nobody
+  // has.
+  void find_level(size_t y, size_t left, size_t count, size_t width, uint8_t* const room[3],
+                  const uint8_t* out[3]) const {
+    if (!level[0]) model->evaluate(y * width + left, count, room);
+    for (int c = 0; c < kChannels; ++c)
+      out[c] = level[0] ? level[c] + y * level_stride + left : room[c];
+  }
 };
 
 // Writes rows first_row .. first_row + row_count - 1 of the task's picture. Any threads may write

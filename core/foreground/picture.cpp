@@ -102,7 +102,7 @@ class Writer {
       for (int c = 0; c < 3; ++c)
         rows_[r][c] = shape_.is_direct(c) && !shape_.is_shared(c) ? shape_.sample(c, y, block.left)
                                                                   : room_.shown[r][c];
-      make_row(r, first_pixel(block, r), block.count);
+      make_row(r, block);
       const uint8_t* alpha =
           out_.alpha ? make_alpha(r, first_pixel(block, r), block.count) : nullptr;
       if (packed)
@@ -119,18 +119,24 @@ class Writer {
   }
 
   // What the pixels of a row are.
-  void make_row(int r, size_t first, size_t count) {
+  void make_row(int r, const Block& block) {
+    const size_t first = first_pixel(block, r), count = block.count;
     uint8_t* const* const to = rows_[r];
     const uint8_t* const mask = task_.mask ? task_.mask + first : nullptr;
     for (int c = 0; c < 3; ++c)
       if (shape_.has(c) && is_constant_[c]) std::memset(to[c], levels_.black[c], count);
     switch (task_.output) {
-      case Output::background:
-        task_.evaluate(first, count, to);
+      case Output::background: {
+        const uint8_t* level[3];
+        find_level(r, block, to, level);
+        for (int c = 0; c < 3; ++c)
+          if (level[c] != to[c] && shape_.has(c)) std::memcpy(to[c], level[c], count);
         break;
+      }
       case Output::foreground: {
-        uint8_t* const level[3] = {room_.level[0], room_.level[1], room_.level[2]};
-        task_.evaluate(first, count, level);
+        uint8_t* const room[3] = {room_.level[0], room_.level[1], room_.level[2]};
+        const uint8_t* level[3];
+        find_level(r, block, room, level);
         for (int c = 0; c < 3; ++c)
           if (!is_constant_[c])
             residual_levels(task_.x[c] + first, level[c], levels_.black[c], levels_.white[c], count,
@@ -161,6 +167,11 @@ class Writer {
         break;
       }
     }
+  }
+
+  void find_level(int r, const Block& block, uint8_t* const room[3], const uint8_t* out[3]) const {
+    task_.find_level(static_cast<size_t>(block.y + r), block.left, block.count,
+                     static_cast<size_t>(out_.width), room, out);
   }
 
   const uint8_t* make_alpha(int r, size_t first, size_t count) {

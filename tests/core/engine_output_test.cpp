@@ -56,6 +56,53 @@ TEST(EngineOutput, FollowsItsDefinition) {
   }
 }
 
+// Whatever is asked for first, and however often.
+TEST(EngineOutput, PicturesOfOneFrameShareWhatIsComputed) {
+  std::mt19937 rng(123);
+  const Clip clip = moving_box_clip(300, 12, 40, rng);
+  for (int rank : {1, 0})
+    for (int softness : {0, 2}) {
+      auto options = window_of(8);
+      options.dmd.rank = rank;
+      options.mask_softness = softness;
+      const Outputs alone(clip, options);
+      const std::vector<std::vector<uint8_t>>* const expected[] = {
+          &alone.background, &alone.foreground, &alone.mask, &alone.cutout};
+      constexpr Output kOutputs[] = {Output::background, Output::foreground, Output::mask,
+                                     Output::cutout};
+      Strip strip(clip.pixels, options);
+      size_t frame = 0;
+      const auto take = [&] {
+        for (; strip.engine.ready(); ++frame) {
+          for (size_t k = 0; k < 6; ++k) {
+            const size_t which = (k + frame) % 4;
+            // Packed, in rows with gaps or without, and each channel by itself.
+            Picture packed(strip.width, 1, 3 + static_cast<int>(k % 2));
+            strip.engine.write(kOutputs[which], Levels(), packed.out());
+            ASSERT_EQ((*expected[which])[frame], packed.planes()) << which << " of " << frame;
+            std::vector<uint8_t> planes(3 * clip.pixels);
+            MutableImageView view;
+            view.width = strip.width;
+            view.height = 1;
+            view.pixel_stride = 1;
+            view.row_stride = strip.width;
+            for (size_t c = 0; c < 3; ++c) view.channel[c] = planes.data() + c * clip.pixels;
+            strip.engine.write(kOutputs[which], Levels(), view);
+            ASSERT_EQ((*expected[which])[frame], planes) << which << " of " << frame;
+          }
+          strip.engine.skip();
+        }
+      };
+      for (const auto& picture : clip.frames) {
+        ASSERT_TRUE(strip.push(picture).ok());
+        take();
+      }
+      ASSERT_TRUE(strip.engine.drain().ok());
+      take();
+      EXPECT_EQ(clip.size(), frame);
+    }
+}
+
 TEST(EngineOutput, ThresholdTakesEffectAtOnce) {
   std::mt19937 rng(121);
   const Clip clip = moving_box_clip(300, 6, 40, rng);

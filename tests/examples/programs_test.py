@@ -1,6 +1,6 @@
 """Runs every program of examples/ and looks at what it leaves.
 
-Usage: programs_test.py SOURCE_ROOT EMBED DEMO      (the two programs that are built)
+Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that are built)
 """
 import pathlib
 import re
@@ -13,10 +13,11 @@ import time
 import common
 
 # demo.sh installs packages and builds: continuous integration runs it after these tests.
-KNOWN = {'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'watch.py'}
+KNOWN = {'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'two_pads.cpp',
+         'watch.py'}
 WIDTH, HEIGHT = 320, 240
 
-root, embed, demo = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
+root, embed, demo, two_pads = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
 examples = root / 'examples'
 
 
@@ -66,6 +67,20 @@ def embed_errors(folder):
     assert 'missing.avi' in errors, errors
     _, errors = run(folder, embed, '--plate', 'no/folder/wall.png', expect=1)
     assert 'no/folder' in errors, errors
+
+
+def two_pads_simulated(folder):
+    said, _ = run(folder, two_pads)
+    shares = [float(share) for share in re.findall(r's: foreground +([\d.]+) %', said)]
+    assert len(shares) == 150, said
+    assert 0.5 < sum(shares) / len(shares) < 20, said
+
+
+def two_pads_film(folder):
+    said, _ = run(folder, two_pads, 'film.avi')
+    assert said.count('foreground') > 100, said
+    _, errors = run(folder, two_pads, 'missing.avi', expect=1)
+    assert 'missing.avi' in errors, errors
 
 
 def watch_simulated(folder):
@@ -163,7 +178,7 @@ def messages_as_documented(folder):
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, watch_simulated, watch_film,
               watch_errors, record_motion, record_nothing, record_errors, messages_as_documented,
-              run_demo]
+              two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         common.make_film(folder / 'film.avi')

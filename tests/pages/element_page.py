@@ -10,7 +10,9 @@ import gi
 gi.require_version('Gst', '1.0')
 from gi.repository import GObject, Gst
 
-ELEMENTS = ['qdmdbackground', 'qdmdscenesrc']
+ELEMENTS = ['qdmdbackground', 'qdmdseparate', 'qdmdscenesrc']
+# Elements that have another one's properties and signals, but for some.
+LIKE = {'qdmdseparate': ('qdmdbackground', ['output'])}
 PLAIN_NAMES = {'gboolean': 'boolean', 'guint': 'uint', 'gint': 'int', 'guint64': 'uint64',
                'gdouble': 'double', 'gchararray': 'string', 'GstStructure': 'structure',
                'GstSample': 'sample', 'GstValueArray': 'array'}
@@ -100,11 +102,36 @@ def print_signals(kind):
               f'returns {returns}.\n')
 
 
-def print_element(name):
+def load(name):
     factory = Gst.ElementFactory.find(name)
     if not factory:
         sys.exit(f'there is no {name}: does GST_PLUGIN_PATH name the folder of the plugins?')
-    factory = factory.load()
+    return factory.load()
+
+
+def said_of(name):
+    """{name of a property or signal: what is said of it}"""
+    kind = load(name).get_element_type()
+    said = {spec.name: (spec.value_type, spec.blurb, default_of(spec), range_of(spec),
+                        changeable(spec))
+            for spec in GObject.list_properties(kind) if spec.owner_type == kind}
+    for signal in GObject.signal_list_names(kind):
+        query = GObject.signal_query(signal, kind)
+        said[signal] = (query.return_type, query.param_types)
+    return said
+
+
+def print_likeness(name):
+    other, without = LIKE[name]
+    own, its = said_of(name), said_of(other)
+    if own != {key: said for key, said in its.items() if key not in without}:
+        sys.exit(f'{name} is not {other} without {without}: take it out of LIKE')
+    print(f'Properties and signals: those of [{other}](#{other}), without '
+          f'{", ".join(f"`{word}`" for word in without)}.\n')
+
+
+def print_element(name):
+    factory = load(name)
     kind = factory.get_element_type()
     properties = GObject.list_properties(kind)
     own = [spec for spec in properties if spec.owner_type == kind]
@@ -114,6 +141,9 @@ def print_element(name):
     print(f'Klass `{factory.get_metadata("klass")}`, rank {factory.get_rank()}, '
           f'in `{factory.get_plugin_name()}`.\n')
     print_pads(factory)
+    if name in LIKE:
+        print_likeness(name)
+        return
     print_properties(own)
     print(f'Of its base classes: {", ".join(f"`{name}`" for name in inherited)}.\n')
     print_signals(kind)

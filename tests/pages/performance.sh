@@ -21,7 +21,7 @@ tests/install-dependencies.sh build test docs
 
 if [ "$form" != --page ]; then
   bench=build/tests/bench
-  build gst/libgstqdmd.so "${bench#build/}"/{element,stages,passes,gram,adjoint,live}
+  build gst/libgstqdmd.so "${bench#build/}"/{element,separate,stages,passes,gram,adjoint,live}
   export QDMD_BENCH_TURNS=$turns
 
   # step NAME COMMAND...: what a program prints, in $results/NAME; what it says meanwhile is shown.
@@ -43,6 +43,7 @@ if [ "$form" != --page ]; then
 
   uptime >"$results/load-before"
   google element "frame/$cases"
+  google separate "outputs/$cases"
   google stages "stages/$cases"
   google passes '/(320x240|1920x1080)' --benchmark_min_time="$min_time"
   google gram '^peak|^[^rw].*/m:(60|100|200)/' --benchmark_min_time="$min_time"

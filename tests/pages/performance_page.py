@@ -32,6 +32,7 @@ class Results:
         self.stages = self.benchmarks('stages', r'stages/(\d+)x(\d+)/window:(\d+)/threads:(\d+)')
         self.passes = self.benchmarks('passes', r'([a-z_]+)/(\d+)x(\d+)')
         self.gram = self.benchmarks('gram', r'(.+)')
+        self.outputs = self.benchmarks('separate', r'outputs/(\d+)x(\d+)/window:(\d+)/(\w+)')
 
     def text(self, name):
         return read(os.path.join(self.folder, name))
@@ -164,6 +165,23 @@ def bounds_table(results):
     return table(['stage', *(f'{width}x{height}' for width, height in sizes)], rows)
 
 
+OUTPUTS = (('background', 'background'), ('mask', 'mask'), ('background_mask', 'both'),
+           ('mask_cutout', 'mask and cutout'), ('all', 'all four'), ('two_elements', 'two elements'))
+
+
+def outputs_table(runs):
+    """Of several pictures at once; runs: {(width, height, window, mode): counters}"""
+    rows = []
+    for (width, height, window, mode), run in sorted(
+            runs.items(), key=lambda item: (item[0][0] * item[0][1], item[0][3])):
+        for unit, title in (('cpu', 'processor'), ('ms', 'clock')):
+            times = [run[f'{unit}/{name}'] for name, _ in OUTPUTS]
+            rows.append([f'{width}x{height}, {window}, {mode}', title, *map(figure, times),
+                         figure(times[2] / max(times[0], times[1]))])
+    return table(['size, window-size, mode', 'ms a frame', *(title for _, title in OUTPUTS),
+                  'both / the longer one'], rows)
+
+
 def live_table(results):
     live = results.live('live-1080p.txt')
     small = results.live('live-320x240.txt')
@@ -246,6 +264,7 @@ def main():
         'gram': gram_table(results),
         'adjoint': results.text('adjoint.txt').partition('\n\n')[2],
         'live': live_table(results),
+        'outputs': outputs_table(results.outputs),
     })
 
     plot(os.path.join(plots, 'size.svg'), results,

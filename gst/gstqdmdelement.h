@@ -1,0 +1,31 @@
+// What qdmdbackground and qdmdseparate do alike around their frames: properties, signals, start,
+// events, latency.
+#pragma once
+
+#include "gst/gstqdmdstate.h"
+
+// A pad's caps.
+#define QDMD_FORMATS                                                                          \
+  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, YV12, NV21, " \
+  "Y42B, "                                                                                    \
+  "NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8 }"
+
+namespace qdmd {
+
+// In class_init; the class's instances have a State.
+void install_properties_and_signals(GObjectClass* klass, WhichSettings which);
+
+// From READY to PAUSED. False: an error was posted. close() is what ends it.
+bool start(GstElement* self);
+// The video that comes has these caps: the engine begins anew. With the stream lock. False: an
+// error was posted.
+bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps);
+// An event is about to be forwarded, from the streaming thread: what it ends is sent or dropped
+// first. Caps are the element's own affair.
+void before_event(GstElement* self, GstEvent* event);
+// A LATENCY query of a source pad.
+bool answer_latency(GstElement* self, GstPad* sink, GstQuery* query);
+// Metadata about the picture's geometry stays true: size and orientation do not change here.
+bool keeps_meta(const GstMetaInfo* info);
+
+}  // namespace qdmd
