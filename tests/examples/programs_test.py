@@ -13,7 +13,8 @@ import time
 import common
 
 # demo.sh installs packages and builds: continuous integration runs it after these tests.
-KNOWN = {'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'watch.py'}
+# subtract.cpp is built and run by tests/install.
+KNOWN = {'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'subtract.cpp', 'watch.py'}
 WIDTH, HEIGHT = 320, 240
 
 root, embed, demo = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
