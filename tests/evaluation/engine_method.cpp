@@ -14,18 +14,18 @@ namespace {
 // Properties that engine_options() reads, and `mode`, whose only value is the engine's batch mode.
 constexpr const char* kKnown[] = {
     "window-size", "rank",        "omega-threshold", "amplitude", "solver", "foreground-threshold",
-    "iterations",  "sample-step", "max-memory",      "n-threads", "mode"};
+    "iterations",  "sample-step", "max-memory",      "n-threads", "mode",   "stabilize"};
 
 EngineOptions engine_options(GstElement* element) {
   guint window_size = 0, rank = 0, threads = 0, iterations = 0, sample_step = 0;
-  gint method = 0, amplitude = 0, solver = 0;
+  gint method = 0, amplitude = 0, solver = 0, stabilize = 0;
   guint64 max_memory = 0;
   EngineOptions options;
   g_object_get(element, "window-size", &window_size, "rank", &rank, "n-threads", &threads, "method",
                &method, "amplitude", &amplitude, "solver", &solver, "max-memory", &max_memory,
-               "iterations", &iterations, "sample-step", &sample_step, "omega-threshold",
-               &options.dmd.omega_threshold, "foreground-threshold", &options.foreground_threshold,
-               nullptr);
+               "stabilize", &stabilize, "iterations", &iterations, "sample-step", &sample_step,
+               "omega-threshold", &options.dmd.omega_threshold, "foreground-threshold",
+               &options.foreground_threshold, nullptr);
   options.window_size = static_cast<int>(window_size);
   options.threads = static_cast<int>(threads);
   options.iterations = static_cast<int>(iterations);
@@ -36,6 +36,7 @@ EngineOptions engine_options(GstElement* element) {
   options.method = static_cast<qdmd::Method>(method);
   options.dmd.amplitude = static_cast<Amplitude>(amplitude);
   options.dmd.solver = static_cast<Solver>(solver);
+  options.stabilize = static_cast<Stabilize>(stabilize);
   return options;
 }
 

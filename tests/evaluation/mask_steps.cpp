@@ -31,6 +31,7 @@ struct Variant {
 void run_engine(const Clip& clip, Mode mode, const DecisionSteps& steps, Shadows shadows,
                 const See& see) {
   EngineOptions options;
+  options.stabilize = Stabilize::translation;
   options.mode = mode;
   options.steps = steps;
   Engine engine;

@@ -20,6 +20,7 @@ CASES = {
     'segmentation': ('RGBA', 'segmentation method=mog2 test-mode=true'),
     'default': ('RGBA', 'qdmdbackground'),
     'default, `output=mask`': ('RGBA', MASK),
+    '`stabilize=off output=mask`': ('RGBA', f'{MASK} stabilize=off'),
     '`mode=live output=mask`': ('RGBA', f'{MASK} mode=live'),
     '`method=qdmd output=mask`': ('RGBA', f'{MASK} method=qdmd'),
     'I420 identity': ('I420', 'identity'),
