@@ -27,22 +27,22 @@ constexpr int kWhole = 300;
 
 struct Setting {
   Method method = Method::robust;
-  Solver solver = Solver::gram;
+  Solver solver = Solver::automatic;
   int rank = 0, step = 0, window = kWhole, iterations = 1;
 };
 
 std::vector<Setting> settings(bool brief) {
   std::vector<Setting> all;
   const auto robust = [&](int window, int rank, int step, int iterations) {
-    all.push_back({Method::robust, Solver::gram, rank, step, window, iterations});
+    all.push_back({Method::robust, Solver::automatic, rank, step, window, iterations});
   };
   const auto qdmd = [&](Solver solver, int window, int rank, int step) {
     all.push_back({Method::qdmd, solver, rank, step, window, 1});
   };
   if (brief) {
     robust(kWhole, 0, 0, 1);
-    qdmd(Solver::gram, kWhole, 0, 1);
-    qdmd(Solver::gram, kWhole, 0, 4);
+    qdmd(Solver::automatic, kWhole, 0, 1);
+    qdmd(Solver::automatic, kWhole, 0, 4);
     qdmd(Solver::qr, 10, 1, 1);
     return all;
   }
@@ -55,14 +55,15 @@ std::vector<Setting> settings(bool brief) {
   for (int rank : {2, 3}) robust(kWhole, rank, 0, 1);
   for (int step : {1, 2, 16}) robust(kWhole, 0, step, 1);
   for (int rank : {1, 3, 0})
-    for (int step : {1, 2, 4, 8, 16}) qdmd(Solver::gram, kWhole, rank, step);
+    for (int step : {1, 2, 4, 8, 16}) qdmd(Solver::automatic, kWhole, rank, step);
   for (int window : {25, 50, 100})
-    for (int rank : {1, 0}) qdmd(Solver::gram, window, rank, 1);
+    for (int rank : {1, 0}) qdmd(Solver::automatic, window, rank, 1);
   for (int window : {25, 100})
-    for (int rank : {1, 0}) qdmd(Solver::gram_extended, window, rank, 1);
+    for (Solver solver : {Solver::gram, Solver::gram_extended})
+      for (int rank : {1, 0}) qdmd(solver, window, rank, 1);
   // A QR factorization of more frames takes minutes.
   for (int rank : {1, 0}) qdmd(Solver::qr, 25, rank, 1);
-  for (int rank : {1, 0}) all.push_back({Method::dmd, Solver::gram, rank, 1, kWhole, 1});
+  for (int rank : {1, 0}) all.push_back({Method::dmd, Solver::automatic, rank, 1, kWhole, 1});
   return all;
 }
 
@@ -284,7 +285,7 @@ void measure_quality(const TrueClip& clip, const QualityLimits& limits, Table* t
     if (pictures.empty()) continue;
     score(clip, pictures, entry.point.window, &entry.values);
     if (!entry.setting || entry.setting->method != Method::qdmd ||
-        entry.setting->solver != Solver::gram || entry.setting->window != kWhole)
+        entry.setting->solver != Solver::automatic || entry.setting->window != kWhole)
       continue;
     Setting all = *entry.setting;
     all.step = 1;

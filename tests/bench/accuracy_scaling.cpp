@@ -192,6 +192,7 @@ void add_scaling(bool brief, int turns, double seconds, Table* table, Steps* ste
       add_solve(sweep, problem, kTiny, Solver::gram, 0);
       if (window > 400) continue;
       for (int rank : {1, 3}) add_solve(sweep, problem, kTiny, Solver::gram, rank);
+      for (int rank : {0, 1}) add_solve(sweep, problem, kTiny, Solver::automatic, rank);
       add_solve(sweep, problem, kTiny, Solver::gram_extended, 0);
       if (window <= 200) add_solve(sweep, problem, kTiny, Solver::qr, 0);
     }

@@ -26,6 +26,13 @@ def spectrum(source, settings):
     Gst.init(None)
     pipeline = Gst.parse_launch(f'{source} ! videoconvert ! qdmdbackground method=qdmd spectrum=true '
                                 f'post-messages=true {settings} ! fakesink sync=false')
+    try:
+        return first_window(pipeline)
+    finally:
+        pipeline.set_state(Gst.State.NULL)
+
+
+def first_window(pipeline):
     pipeline.set_state(Gst.State.PLAYING)
     kinds = Gst.MessageType.ELEMENT | Gst.MessageType.ERROR | Gst.MessageType.EOS
     found = None
@@ -43,7 +50,6 @@ def spectrum(source, settings):
                                                           'amplitudes', 'background')))
             found = [(complex(x, y), amplitude, chosen) for x, y, amplitude, chosen in zip(
                 real, imaginary, amplitudes, background)]
-    pipeline.set_state(Gst.State.NULL)
     return found
 
 

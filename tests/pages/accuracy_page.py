@@ -18,7 +18,7 @@ def properties(setting):
     if setting.method in results.PEERS:
         return setting.method
     parts = [f'method={setting.method}', f'window-size={setting.window}']
-    if setting.solver != 'gram':
+    if setting.solver != 'auto':
         parts.append(f'solver={setting.solver}')
     if setting.rank or setting.method != 'robust':
         parts.append(f'rank={setting.rank}')
@@ -73,8 +73,8 @@ class Quality:
         return '\n\n'.join(parts)
 
     def knobs(self):
-        robust = Setting('robust', 'gram', 0, 0, WHOLE, 1)
-        qdmd = Setting('qdmd', 'gram', 1, 1, WHOLE, 1)
+        robust = Setting('robust', 'auto', 0, 0, WHOLE, 1)
+        qdmd = Setting('qdmd', 'auto', 1, 1, WHOLE, 1)
         rows = [('`robust`, everything in one window', robust)]
         rows += [(f'its `window-size={window}`' +
                   (' (the default)' if window == results.DEFAULT.window else ''),
@@ -102,8 +102,8 @@ class Quality:
     def digits(self):
         """The same settings by other solvers."""
         rows = []
-        for window, solvers in ((25, ('gram', 'gram-extended', 'qr')),
-                                (100, ('gram', 'gram-extended'))):
+        for window, solvers in ((25, ('auto', 'gram', 'gram-extended', 'qr')),
+                                (100, ('auto', 'gram', 'gram-extended'))):
             for rank in (1, 0):
                 rows += [(f'`qdmd window-size={window} rank={rank} solver={solver}`',
                           Setting('qdmd', solver, rank, 1, window, 1)) for solver in solvers]
@@ -114,11 +114,11 @@ class Quality:
         means = self.means[scenes]
         choices = [
             ('nothing to think about', results.DEFAULT),
-            ('the best background, and can wait', Setting('robust', 'gram', 0, 0, WHOLE, 1)),
-            ('less delay and memory', Setting('robust', 'gram', 0, 0, 50, 1)),
-            ('the least time and delay', Setting('qdmd', 'gram', 1, 1, 25, 1)),
-            ('one steady background for little time', Setting('qdmd', 'gram', 1, 8, WHOLE, 1)),
-            ('the paper\'s decomposition, full rank', Setting('qdmd', 'gram', 0, 1, WHOLE, 1)),
+            ('the best background, and can wait', Setting('robust', 'auto', 0, 0, WHOLE, 1)),
+            ('less delay and memory', Setting('robust', 'auto', 0, 0, 50, 1)),
+            ('the least time and delay', Setting('qdmd', 'auto', 1, 1, 25, 1)),
+            ('one steady background for little time', Setting('qdmd', 'auto', 1, 8, WHOLE, 1)),
+            ('the paper\'s decomposition, full rank', Setting('qdmd', 'auto', 0, 1, WHOLE, 1)),
             ('its digits for nearly dependent frames',
              Setting('qdmd', 'gram-extended', 0, 1, 100, 1)),
         ]
@@ -134,7 +134,7 @@ class Quality:
 
 
 def sampling_table(rows):
-    found = results.chosen(rows, part='quality', method='qdmd', solver='gram', window=WHOLE)
+    found = results.chosen(rows, part='quality', method='qdmd', solver='auto', window=WHOLE)
     steps = sorted({row['step'] for row in found if row['step'] > 1})
     lines = []
     for rank, name in ((1, '1'), (3, '3'), (0, 'full')):

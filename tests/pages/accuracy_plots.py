@@ -165,7 +165,7 @@ def growth(folder, rows):
 
 def sampling(folder, rows):
     drawing, axes = panels(2, 4.6)
-    found = [row for row in results.chosen(rows, part='quality', method='qdmd', solver='gram',
+    found = [row for row in results.chosen(rows, part='quality', method='qdmd', solver='auto',
                                            window=results.WHOLE)]
     steps = sorted({row['step'] for row in found})
     for rank, (colour, label) in RANKS.items():

@@ -21,6 +21,8 @@ GRAM = Line('Gram', 'qdmd', 'gram', 0, 'Gram matrix', 100)
 SOLVE = Line('solve', 'qdmd', 'gram', 0, 'small problem, gram, full rank', 200)
 LINES = (GRAM, SOLVE,
          Line('solve', 'qdmd', 'gram', 1, 'small problem, gram, rank 1', 100),
+         Line('solve', 'qdmd', 'auto', 0, 'small problem, auto (its bounds included), full rank', 200),
+         Line('solve', 'qdmd', 'auto', 1, 'small problem, auto (its bounds included), rank 1', 100),
          Line('solve', 'qdmd', 'gram', 3, 'small problem, gram, rank 3', 100),
          Line('solve', 'qdmd', 'gram-extended', 0, 'small problem, gram-extended', 100),
          Line('solve', 'qdmd', 'qr', 0, 'small problem and its pixels, qr', 50),
@@ -32,7 +34,7 @@ GROWS = {'width': 'pixels', 'window': 'frames of the window'}
 
 Setting = collections.namedtuple('Setting', 'method solver rank step window iterations')
 PEERS = ('median', 'mean', 'mog2', 'knn', 'segmentation')
-DEFAULT = Setting('robust', 'gram', 0, 0, 100, 1)
+DEFAULT = Setting('robust', 'auto', 0, 0, 100, 1)
 WHOLE = 300  # a window that has every clip in it
 
 

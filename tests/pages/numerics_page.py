@@ -1,4 +1,4 @@
-"""Puts the hard cases and the times of the small problem into docs/numerics.md.
+"""Puts the hard cases, the estimators and the times of the small problem into docs/numerics.md.
 
 Usage: numerics_page.py PAGE RESULTS
 """
@@ -25,7 +25,8 @@ def times(path):
 def main():
     page, folder = sys.argv[1:]
     put(page, {'cases': read(os.path.join(folder, 'cases.md')),
-               'times': times(os.path.join(folder, 'times.json'))})
+               'estimators': read(os.path.join(folder, 'estimators.md')),
+              'times': times(os.path.join(folder, 'times.json'))})
 
 
 main()
