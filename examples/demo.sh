@@ -16,7 +16,9 @@ tests/install-dependencies.sh build demo
 again=()
 [ ! -f build/build.ninja ] || again=(--reconfigure)
 meson setup "${again[@]}" build -Dexamples=enabled -Dscene=enabled
-ninja -C build gst/libgstqdmd.so gst/libgstqdmdscene.so examples/qdmd-demo
+jobs=$(tests/jobs.sh)
+echo "Compiling takes some minutes ($jobs at once: each compiler needs up to 2 GB of memory)"
+ninja -C build -j "$jobs" gst/libgstqdmd.so gst/libgstqdmdscene.so examples/qdmd-demo
 
 demo=build/demo
 mkdir -p "$demo"

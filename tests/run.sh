@@ -39,7 +39,7 @@ echo "== build"
 again=()
 [ ! -f build/build.ninja ] || again=(--reconfigure)
 meson setup "${again[@]}" build -Dtests=enabled -Dscene=enabled
-ninja -C build
+ninja -C build -j "$(tests/jobs.sh)"
 
 echo "== test"
 rm -f build/meson-logs/testlog.junit.xml

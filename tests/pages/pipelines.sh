@@ -19,9 +19,10 @@ gst-launch-1.0 -q $source ! tee name=t \
   videoscale method=lanczos ! video/x-raw,width=480,height=360 ! \
   $picture location="$pictures/outputs.jpg" \
   t. ! $long ! side.sink_0 \
-  t. ! $long ! qdmdbackground ! side.sink_1 \
-  t. ! $long ! qdmdbackground output=foreground ! side.sink_2 \
-  t. ! $long ! qdmdbackground output=mask ! side.sink_3
+  t. ! qdmdseparate name=s \
+  s.background ! $long ! side.sink_1 \
+  s.foreground ! $long ! side.sink_2 \
+  s.mask ! $long ! side.sink_3
 
 # What is linked to the compositor first lies below.
 gst-launch-1.0 -q compositor name=over sink_0::repeat-after-eos=true ! \
