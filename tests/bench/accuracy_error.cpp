@@ -8,7 +8,7 @@
 #include "tests/bench/accuracy_quality.h"
 #include "tests/core/solver_names.h"
 #include "tests/stability/assessment.h"
-#include "tests/stability/reference.h"
+#include "tests/stability/decimal_solver.h"
 
 namespace qdmd::bench {
 namespace {
@@ -173,7 +173,7 @@ void measure_solvers(const std::string& scene, int frames, int turns, double sec
 
   const Window window = window_of(simulated(scene, kWidth, kHeight, frames));
   const IntegerMatrix gram = gram_of(window);
-  const stability::Reference reference(gram, probes_of(window));
+  const stability::DecimalSolver reference(gram, probes_of(window));
   std::map<int, stability::Answer> exact;  // by rank
   std::vector<Values> values;
   std::vector<Job> jobs;

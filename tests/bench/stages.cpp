@@ -71,7 +71,7 @@ class Batch {
     auto& [conversion, gram, solve, combination, statistics, output] = times;
     for (int t = 0, fresh = 0; t < c_.window; ++t) {
       camera_.render(t, in_.data());
-      conversion += took([&] { take_in(); });
+      conversion += took([&] { append_frame(); });
       if (++fresh < kGroup && t + 1 < c_.window) continue;
       gram +=
           took([&] { background_.learner().add(frames_.window(), std::exchange(fresh, 0), {}); });
@@ -88,7 +88,7 @@ class Batch {
   const SolveReport& report() const { return background_.report(); }
 
  private:
-  void take_in() { frames_.append(view_of(c_, std::as_const(in_).data())); }
+  void append_frame() { frames_.append(view_of(c_, std::as_const(in_).data())); }
 
   void write(int t) {
     BackgroundModel& model = background_.model();

@@ -51,7 +51,7 @@ void require_size(const cv::Mat& picture, const fs::path& path, const cv::Mat& f
         " pixels, " + fs::relative(first_path, folder).string() + " has " + size_text(first));
 }
 
-void read_labels(const Sequence& sequence, const std::vector<fs::path>& paths, Clip* clip) {
+void read_labels(const Sequence& sequence, const std::vector<fs::path>& paths, LabelledClip* clip) {
   std::vector<cv::Mat> labels(paths.size());
   bool any = false;
   for (size_t i = 0; i < paths.size(); ++i) {
@@ -97,12 +97,12 @@ std::vector<fs::path> Selection::of(const Sequence& sequence) const {
   return chosen;
 }
 
-Clip read_clip(const Sequence& sequence, const Selection& selection) {
+LabelledClip read_clip(const Sequence& sequence, const Selection& selection) {
   const std::vector<fs::path> paths = selection.of(sequence);
   if (paths.empty())
     throw std::runtime_error("no frames are left: the sequence has " +
                              std::to_string(sequence.frames.size()));
-  Clip clip;
+  LabelledClip clip;
   for (const auto& path : paths) {
     clip.frames.push_back(read_picture(path, cv::IMREAD_COLOR, sequence.folder));
     require_size(clip.frames.back(), path, clip.frames[0], paths[0], sequence.folder);

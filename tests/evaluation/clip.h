@@ -20,7 +20,7 @@ struct Selection {
   std::vector<std::filesystem::path> of(const Sequence& sequence) const;
 };
 
-struct Clip {
+struct LabelledClip {
   std::vector<cv::Mat> frames;  // 8-bit BGR, all of one size
   cv::Mat truth;                // 8-bit BGR of that size; empty: none
   std::vector<cv::Mat> labels;  // of frames with a mask, 8-bit; others empty. No elements: no masks
@@ -29,7 +29,7 @@ struct Clip {
 
 // Throws std::runtime_error that names the file where a frame cannot be read or has another size
 // than the first one, and where the selection has no frame.
-Clip read_clip(const Sequence& sequence, const Selection& selection);
+LabelledClip read_clip(const Sequence& sequence, const Selection& selection);
 
 // An 8-bit BGR picture of OpenCV for the core.
 ImageView view_of(const cv::Mat& bgr);

@@ -30,10 +30,10 @@ struct Options {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
-const std::map<std::string, Picture> kPictures{{"first", Picture::first},
-                                               {"middle", Picture::middle},
-                                               {"last", Picture::last},
-                                               {"median", Picture::median}};
+const std::map<std::string, ScoredPicture> kPictures{{"first", ScoredPicture::first},
+                                                     {"middle", ScoredPicture::middle},
+                                                     {"last", ScoredPicture::last},
+                                                     {"median", ScoredPicture::median}};
 const std::map<std::string, Format> kFormats{
     {"text", Format::text}, {"csv", Format::csv}, {"json", Format::json}};
 

@@ -76,7 +76,8 @@ struct Seen {
 
 // Goes through a clip with the engine's defaults, and shows what its decisions would be about: a
 // batch's first window every fourth frame, as a rehearsal, then all frames.
-void watch(const Clip& clip, const std::function<void(const Seen& seen, bool rehearsal)>& see) {
+void watch(const LabelledClip& clip,
+           const std::function<void(const Seen& seen, bool rehearsal)>& see) {
   Engine engine;
   EngineOptions options;
   const cv::Size size = clip.frames[0].size();
@@ -122,7 +123,7 @@ void watch(const Clip& clip, const std::function<void(const Seen& seen, bool reh
 }
 
 // F of each set of constants.
-std::vector<double> scores(const Clip& clip, const Sequence& sequence,
+std::vector<double> scores(const LabelledClip& clip, const Sequence& sequence,
                            const std::vector<DecisionConstants>& sets, Pool* pool) {
   const cv::Size size = clip.frames[0].size();
   const auto pixels = clip.frames[0].total();

@@ -24,11 +24,11 @@ using See = std::function<void(const cv::Mat& mask)>;
 
 struct Variant {
   std::string name;
-  std::function<void(const Clip& clip, const See& see)> run;
+  std::function<void(const LabelledClip& clip, const See& see)> run;
 };
 
 // The element's defaults but for mode, steps and shadows, frame by frame.
-void run_engine(const Clip& clip, Mode mode, const DecisionSteps& steps, Shadows shadows,
+void run_engine(const LabelledClip& clip, Mode mode, const DecisionSteps& steps, Shadows shadows,
                 const See& see) {
   EngineOptions options;
   options.stabilize = Stabilize::translation;
@@ -60,7 +60,7 @@ std::vector<Variant> variants() {
   std::vector<Variant> all;
   const auto add = [&](const std::string& name, Mode mode, const DecisionSteps& steps,
                        Shadows shadows) {
-    all.push_back({name, [=](const Clip& clip, const See& see) {
+    all.push_back({name, [=](const LabelledClip& clip, const See& see) {
                      run_engine(clip, mode, steps, shadows, see);
                    }});
   };
@@ -86,7 +86,7 @@ std::vector<Variant> variants() {
   const auto peer = [&](const std::string& name, auto make) {
     for (bool smooth : {false, true})
       all.push_back(
-          {name + (smooth ? ", 9 x 9 median" : ""), [=](const Clip& clip, const See& see) {
+          {name + (smooth ? ", 9 x 9 median" : ""), [=](const LabelledClip& clip, const See& see) {
              const cv::Ptr<cv::BackgroundSubtractor> model = make();
              cv::Mat mask;
              for (const cv::Mat& frame : clip.frames) {
@@ -105,7 +105,7 @@ std::vector<Variant> variants() {
   return all;
 }
 
-double score(const Clip& clip, const Sequence& sequence, const Variant& variant) {
+double score(const LabelledClip& clip, const Sequence& sequence, const Variant& variant) {
   const MaskTruth truth(clip, sequence);
   MaskCounts counts;
   size_t frame = 0;
@@ -114,7 +114,8 @@ double score(const Clip& clip, const Sequence& sequence, const Variant& variant)
 }
 
 // Frames, masks without steps, and masks of the default, side by side.
-void write_sheet(const Clip& clip, const std::vector<size_t>& shown, const std::string& file) {
+void write_sheet(const LabelledClip& clip, const std::vector<size_t>& shown,
+                 const std::string& file) {
   std::vector<std::vector<cv::Mat>> columns(2);
   const DecisionSteps alone = {false, false, false, false, false, false};
   for (size_t i = 0; i < 2; ++i)
@@ -181,7 +182,7 @@ int main(int argc, char** argv) try {
   }
   std::vector<std::vector<double>> scores(chosen.size());
   for (size_t s = 0; s < sequences.size(); ++s) {
-    const Clip clip = read_clip(sequences[s], {});
+    const LabelledClip clip = read_clip(sequences[s], {});
     for (size_t v = 0; v < chosen.size(); ++v) {
       std::fprintf(stderr, "\r%zu of %zu sequences, %-50s", s + 1, sequences.size(),
                    chosen[v].name.c_str());

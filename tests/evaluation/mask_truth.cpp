@@ -5,7 +5,7 @@
 
 namespace qdmd::evaluation {
 
-MaskTruth::MaskTruth(const Clip& clip, const Sequence& sequence)
+MaskTruth::MaskTruth(const LabelledClip& clip, const Sequence& sequence)
     : clip_(clip), sequence_(sequence) {
   const auto region = sequence.folder / "gt/ROI.bmp";
   if (std::filesystem::exists(region)) inside_ = cv::imread(region.string(), cv::IMREAD_GRAYSCALE);

@@ -12,12 +12,12 @@ namespace qdmd::evaluation {
 class MaskTruth {
  public:
   // Keeps references.
-  MaskTruth(const Clip& clip, const Sequence& sequence);
+  MaskTruth(const LabelledClip& clip, const Sequence& sequence);
   // The mask of a frame, counted from 0, in row order. Adds nothing where its truth is not known.
   void add(size_t frame, const uint8_t* mask, MaskCounts* counts) const;
 
  private:
-  const Clip& clip_;
+  const LabelledClip& clip_;
   const Sequence& sequence_;
   cv::Mat inside_;  // empty: all
   size_t first_ = 1, last_ = SIZE_MAX;

@@ -10,11 +10,11 @@
 namespace qdmd::evaluation {
 
 // Which L(t) is scored. `median`: of each sample over all t.
-enum class Picture { first, middle, last, median };
+enum class ScoredPicture { first, middle, last, median };
 
 struct Task {
   const std::vector<cv::Mat>& frames;  // 8-bit BGR, at least one, all of one size
-  Picture picture = Picture::middle;
+  ScoredPicture picture = ScoredPicture::middle;
   bool masks = false;  // asked for
 };
 
@@ -43,9 +43,9 @@ class Method {
 using Methods = std::vector<std::unique_ptr<Method>>;
 
 // Index of the frame whose L(t) is scored; the middle one where that is the median.
-inline size_t scored_frame(Picture picture, size_t frames) {
-  if (picture == Picture::first) return 0;
-  return picture == Picture::last ? frames - 1 : (frames - 1) / 2;
+inline size_t scored_frame(ScoredPicture picture, size_t frames) {
+  if (picture == ScoredPicture::first) return 0;
+  return picture == ScoredPicture::last ? frames - 1 : (frames - 1) / 2;
 }
 
 class Stopwatch {

@@ -21,7 +21,7 @@ TEST(OneScene, IsOneInAllSequences) {
     ++sequences;
     Selection selection;
     selection.frames = 400;
-    const Clip clip = read_clip(sequence, selection);
+    const LabelledClip clip = read_clip(sequence, selection);
     for (Mode mode : {Mode::batch, Mode::live}) {
       Engine engine;
       EngineOptions options;

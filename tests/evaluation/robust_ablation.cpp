@@ -77,7 +77,7 @@ cv::Mat middle_of(BackgroundModel* model, int frames, cv::Size size) {
   return picture;
 }
 
-Outcome measure(const Clip& clip, const Setting& setting, Pool* pool) {
+Outcome measure(const LabelledClip& clip, const Setting& setting, Pool* pool) {
   const cv::Size size = clip.frames[0].size();
   const auto truth = luma(view_of(clip.truth));
   LearnOptions options;
@@ -137,7 +137,7 @@ int main(int argc, char** argv) try {
   evaluation::Selection selection;
   selection.thin = frames;
   for (size_t s = 0; s < sequences.size(); ++s) {
-    const Clip clip = read_clip(sequences[s], selection);
+    const LabelledClip clip = read_clip(sequences[s], selection);
     for (size_t v = 0; v < chosen.size(); ++v) {
       std::fprintf(stderr, "\r%zu of %zu sequences, %-34s", s + 1, sequences.size(),
                    chosen[v].name.c_str());

@@ -32,7 +32,7 @@ struct Work {
   const Sequence* sequence;
   std::string key;
   std::mutex mutex;
-  std::shared_ptr<const Clip> clip;
+  std::shared_ptr<const LabelledClip> clip;
   bool broken = false;
   size_t unfinished = 0;
   std::vector<std::optional<Row>> rows;  // by method
@@ -97,7 +97,7 @@ class Runner {
       *out = record->row;
       return "done before";
     }
-    const std::shared_ptr<const Clip> clip = clip_of(work);
+    const std::shared_ptr<const LabelledClip> clip = clip_of(work);
     if (!clip) return "skipped";
 
     const Task task{clip->frames, plan_.picture, !clip->labels.empty()};
@@ -123,11 +123,11 @@ class Runner {
     return !picture.empty() && digest(picture) == record.background;
   }
 
-  std::shared_ptr<const Clip> clip_of(Work& work) {
+  std::shared_ptr<const LabelledClip> clip_of(Work& work) {
     const std::lock_guard lock(work.mutex);
     if (work.broken || work.clip) return work.clip;
     try {
-      work.clip = std::make_shared<Clip>(read_clip(*work.sequence, plan_.selection));
+      work.clip = std::make_shared<LabelledClip>(read_clip(*work.sequence, plan_.selection));
       for (const auto& what : work.clip->problems) progress_.problem(work.sequence->name, what);
     } catch (const std::exception& error) {
       work.broken = true;
@@ -136,7 +136,7 @@ class Runner {
     return work.clip;
   }
 
-  static Row score(const Clip& clip, const Separation& separation) {
+  static Row score(const LabelledClip& clip, const Separation& separation) {
     Row row;
     row.frames = clip.frames.size();
     row.seconds = separation.seconds;

@@ -12,7 +12,7 @@ struct Plan {
   std::vector<Sequence> sequences;
   Methods methods;
   Selection selection;
-  Picture picture = Picture::middle;
+  ScoredPicture picture = ScoredPicture::middle;
   unsigned jobs = 1;                 // at a time
   std::filesystem::path output_dir;  // of pictures; empty: none are written
   Store store;

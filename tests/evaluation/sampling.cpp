@@ -14,7 +14,7 @@ using namespace qdmd;
 using namespace qdmd::evaluation;
 
 // L(t) of each frame, the clip being one window.
-std::vector<cv::Mat> backgrounds(const Clip& clip, int rank, int sample_step) {
+std::vector<cv::Mat> backgrounds(const LabelledClip& clip, int rank, int sample_step) {
   EngineOptions options;
   options.method = Method::qdmd;
   options.window_size = static_cast<int>(clip.frames.size());
@@ -66,7 +66,7 @@ int main(int argc, char** argv) try {
   for (size_t k = 0; k < steps.size(); ++k) std::printf("---|");
   std::printf("\n");
   const auto sequences = find_sequences(dataset);
-  std::vector<Clip> clips;
+  std::vector<LabelledClip> clips;
   for (const Sequence& sequence : sequences)
     clips.push_back(
         read_clip(sequence, {0, (sequence.frames.size() + frames - 1) / frames, frames}));

@@ -39,15 +39,15 @@ class Hash {
 };
 
 // R, G, B and alpha of each pixel, in row order.
-struct Clip {
+struct RgbaClip {
   std::string name;
   int width, height;
   std::vector<std::vector<uint8_t>> frames;
 };
 
 // A textured scene under noise, with boxes that move, one that stops, and light that changes.
-Clip simulated(const std::string& name, int width, int height, int count, bool light) {
-  Clip clip{name, width, height, {}};
+RgbaClip simulated(const std::string& name, int width, int height, int count, bool light) {
+  RgbaClip clip{name, width, height, {}};
   std::mt19937 rng(7);
   std::vector<uint8_t> scene(static_cast<size_t>(3 * width * height));
   for (int y = 0; y < height; ++y)
@@ -79,8 +79,8 @@ Clip simulated(const std::string& name, int width, int height, int count, bool l
   return clip;
 }
 
-Clip read_clip(const std::filesystem::path& folder, size_t most) {
-  Clip clip{folder.parent_path().filename().string(), 0, 0, {}};
+RgbaClip read_clip(const std::filesystem::path& folder, size_t most) {
+  RgbaClip clip{folder.parent_path().filename().string(), 0, 0, {}};
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry);
   std::sort(files.begin(), files.end());
@@ -105,7 +105,7 @@ enum class Script { plain, freeze, breaks };
 
 class Run {
  public:
-  Run(const Clip& clip, GstVideoFormat format, const std::string& properties, int output_period)
+  Run(const RgbaClip& clip, GstVideoFormat format, const std::string& properties, int output_period)
       : clip_(clip),
         period_(output_period),
         harness_(gst_harness_new_parse(("qdmdbackground " + properties).c_str())),
@@ -230,7 +230,7 @@ class Run {
     }
   }
 
-  const Clip& clip_;
+  const RgbaClip& clip_;
   int period_, taken_ = 0;
   GstHarness* harness_;
   GstElement* element_;
@@ -239,7 +239,7 @@ class Run {
 };
 
 // output_period: frames after which the next output is asked for; 0: as the properties say.
-void print(const Clip& clip, const std::string& properties, int output_period = 0,
+void print(const RgbaClip& clip, const std::string& properties, int output_period = 0,
            Script script = Script::plain, GstVideoFormat format = GST_VIDEO_FORMAT_RGB) {
   static constexpr const char* kScripts[] = {"", " freeze on and off", " breaks and a flush"};
   Run run(clip, format, properties, output_period);
@@ -250,13 +250,13 @@ void print(const Clip& clip, const std::string& properties, int output_period = 
 }
 
 void print_simulated() {
-  const Clip small = simulated("small", 61, 47, 90, false);
-  const Clip medium = simulated("medium", 160, 120, 130, false);
-  const Clip lit = simulated("lit", 160, 120, 130, true);
-  const Clip large = simulated("large", 640, 360, 90, true);
-  const Clip thin = simulated("thin", 300, 1, 60, false);
+  const RgbaClip small = simulated("small", 61, 47, 90, false);
+  const RgbaClip medium = simulated("medium", 160, 120, 130, false);
+  const RgbaClip lit = simulated("lit", 160, 120, 130, true);
+  const RgbaClip large = simulated("large", 640, 360, 90, true);
+  const RgbaClip thin = simulated("thin", 300, 1, 60, false);
   const std::string live = " mode=live";
-  for (const Clip* clip : {&medium, &lit})
+  for (const RgbaClip* clip : {&medium, &lit})
     for (const char* mode : {"", " mode=live"}) {
       print(*clip, std::string("output=mask") + mode);
       print(*clip, std::string("") + mode);
@@ -267,7 +267,7 @@ void print_simulated() {
         for (int threads : {1, 2, 5}) {
           const std::string properties = std::string(mode) + window + " method=" + method +
                                          " n-threads=" + std::to_string(threads);
-          for (const Clip* clip : {&lit, &small}) print(*clip, properties, 7);
+          for (const RgbaClip* clip : {&lit, &small}) print(*clip, properties, 7);
         }
   for (const char* mode : {"mode=batch", "mode=live"})
     for (const char* method : {"robust", "qdmd", "dmd"})
@@ -294,7 +294,7 @@ void print_simulated() {
            {GST_VIDEO_FORMAT_RGBA, GST_VIDEO_FORMAT_BGRx, GST_VIDEO_FORMAT_ARGB,
             GST_VIDEO_FORMAT_GRAY8, GST_VIDEO_FORMAT_I420, GST_VIDEO_FORMAT_NV12,
             GST_VIDEO_FORMAT_GBR})
-        for (const Clip* clip : {&small, &medium})
+        for (const RgbaClip* clip : {&small, &medium})
           print(*clip, std::string(mode) + " window-size=16 method=" + method, 3, Script::plain,
                 format);
       for (const char* more : {"", " n-threads=1", " omega-threshold=10", " sample-step=4"}) {
@@ -310,7 +310,7 @@ void print_real(const std::filesystem::path& data) {
     if (entry.is_directory() && entry.path().filename() == "input") folders.push_back(entry);
   std::sort(folders.begin(), folders.end());
   for (const auto& folder : folders) {
-    const Clip clip = read_clip(folder, 220);
+    const RgbaClip clip = read_clip(folder, 220);
     if (clip.frames.empty()) continue;
     for (const char* properties :
          {"", "output=mask", "mode=live", "mode=live output=mask", "method=qdmd",

@@ -4,7 +4,7 @@
 
 #include "core/dmd/decompose.h"
 #include "tests/core/clips.h"
-#include "tests/stability/reference.h"
+#include "tests/stability/decimal_solver.h"
 
 namespace qdmd::stability {
 namespace {
@@ -42,7 +42,8 @@ double worst(const Distance& distance) { return std::max(distance.lambda, distan
 
 // How far the answer moves when the snapshots do, by `size` of the longest. The rank is held: what
 // a solver counts as zero stays zero.
-double movement(const Reference& reference, DmdOptions options, const Answer& answer, double size) {
+double movement(const DecimalSolver& reference, DmdOptions options, const Answer& answer,
+                double size) {
   double largest = 0;
   options.rank = answer.rank;
   for (unsigned seed = 1; seed <= kDirections; ++seed)
@@ -87,7 +88,7 @@ Precision precision(Solver solver, double pixels, double frames, double conditio
 Assessment assess(const HardCase& hard_case, Amplitude amplitude) {
   const Window window = hard_case.make();
   const IntegerMatrix gram = gram_of(window);
-  const Reference reference(gram, probed_pixels(window));
+  const DecimalSolver reference(gram, probed_pixels(window));
   const auto pixels = static_cast<double>(window.pixels());
   const double frames = window.size();
   const auto singular = reference.singular_values();

@@ -6,13 +6,13 @@ namespace qdmd::stability {
 namespace {
 
 using test::Clip;
-using Picture = std::vector<uint8_t>;
+using Levels = std::vector<uint8_t>;
 using Rng = std::mt19937;
 
 constexpr size_t kPixels = 48;
 
 // A random generator is made afresh for each case: one case more changes no other.
-Picture picture(unsigned seed, int low = 20, int high = 220, size_t pixels = kPixels) {
+Levels picture(unsigned seed, int low = 20, int high = 220, size_t pixels = kPixels) {
   Rng rng(seed);
   return test::random_picture(pixels, rng, low, high);
 }
@@ -22,7 +22,7 @@ Clip noisy(unsigned seed, size_t count, double sigma = 3, size_t pixels = kPixel
   return test::noisy_clip(pixels, count, sigma, rng);
 }
 
-Clip of_frames(const std::vector<Picture>& frames) {
+Clip of_frames(const std::vector<Levels>& frames) {
   Clip clip(frames.front().size() / 3, 0);
   clip.frames = frames;
   return clip;
@@ -78,7 +78,7 @@ Clip green_only() {
 // levels(t) times a picture, rounded.
 Clip light(unsigned seed, size_t count, const std::function<double(size_t)>& levels,
            double sigma = 0) {
-  const Picture base = picture(seed, 20, 220);
+  const Levels base = picture(seed, 20, 220);
   Rng rng(seed);
   std::normal_distribution<double> noise(0, 1);
   Clip clip(kPixels, count);
@@ -90,7 +90,7 @@ Clip light(unsigned seed, size_t count, const std::function<double(size_t)>& lev
 }
 
 Clip exact_fade() {
-  const Picture base = picture(23, 0, 3);
+  const Levels base = picture(23, 0, 3);
   Clip clip(kPixels, 7);
   for (size_t t = 0; t < 7; ++t)
     for (size_t i = 0; i < base.size(); ++i)
@@ -100,7 +100,7 @@ Clip exact_fade() {
 
 // x_t = A + t D: lambda = 1 twice with one eigenvector.
 Clip ramp() {
-  const Picture base = picture(36, 20, 120), slope = picture(37, 0, 15);
+  const Levels base = picture(36, 20, 120), slope = picture(37, 0, 15);
   Clip clip(kPixels, 8);
   for (size_t t = 0; t < 8; ++t)
     for (size_t i = 0; i < base.size(); ++i)
@@ -112,7 +112,7 @@ Clip ramp() {
 // axis by 120 degrees, exact in integers.
 Clip turning(size_t count, size_t pixels, bool random) {
   Clip clip(pixels, count);
-  const Picture start = random ? picture(41, 10, 240, pixels) : Picture{200, 0, 0};
+  const Levels start = random ? picture(41, 10, 240, pixels) : Levels{200, 0, 0};
   for (size_t t = 0; t < count; ++t)
     for (size_t c = 0; c < 3; ++c)
       for (size_t p = 0; p < pixels; ++p) clip.at(t, (c + t) % 3, p) = start[c * pixels + p];
@@ -144,7 +144,7 @@ std::vector<HardCase> make_cases() {
   add("static", "rank one", [] { return test::static_clip(picture(12), 9); });
   add("black", "rank zero: no mode exists", [] { return Clip(kPixels, 6); });
   add("white", "rank one at the largest level",
-      [] { return test::static_clip(Picture(3 * kPixels, 255), 6); });
+      [] { return test::static_clip(Levels(3 * kPixels, 255), 6); });
   all.push_back({"one pixel blinks",
                  "one level at one of 8.3 million pixels: singular values 3e-7 apart", blinking,
                  true});
@@ -164,7 +164,7 @@ std::vector<HardCase> make_cases() {
   add("exponential fade, rounded", "full rank from rounding alone",
       [] { return light(24, 9, [](size_t t) { return std::pow(0.8, static_cast<double>(t)); }); });
   add("alternating", "eigenvalues 1 and -1", [] {
-    const Picture a = picture(25), b = picture(26);
+    const Levels a = picture(25), b = picture(26);
     return of_frames({a, b, a, b, a, b, a, b});
   });
   add("black first frame", "the snapshot that first-frame amplitudes trust is zero",

@@ -6,13 +6,13 @@
 
 #include "core/dmd/decompose.h"
 #include "tests/core/solver_names.h"
-#include "tests/stability/reference.h"
+#include "tests/stability/decimal_solver.h"
 
 namespace qdmd::stability {
 namespace {
 
 using test::Clip;
-using Picture = std::vector<uint8_t>;
+using Levels = std::vector<uint8_t>;
 
 constexpr Solver kSolvers[] = {Solver::automatic, Solver::gram, Solver::gram_extended, Solver::qr,
                                Solver::adjoint};
@@ -37,22 +37,22 @@ class Maker {
 
  private:
   size_t below(size_t limit) { return rng_() % limit; }
-  Picture picture(int low = 0, int high = 255) {
+  Levels picture(int low = 0, int high = 255) {
     return test::random_picture(pixels_, rng_, low, high);
   }
-  Picture tame_picture() {
+  Levels tame_picture() {
     const int low = static_cast<int>(below(120));
     return picture(low, low + static_cast<int>(below(136)));
   }
   void name(const char* text) { kind_ += (kind_.empty() ? "" : ", ") + std::string(text); }
 
-  Clip of(const std::vector<Picture>& pictures, const std::vector<size_t>& order) {
+  Clip of(const std::vector<Levels>& pictures, const std::vector<size_t>& order) {
     Clip clip(pixels_, 0);
     for (size_t index : order) clip.frames.push_back(pictures[index]);
     return clip;
   }
-  std::vector<Picture> some_pictures(size_t most) {
-    std::vector<Picture> all(1 + below(most));
+  std::vector<Levels> some_pictures(size_t most) {
+    std::vector<Levels> all(1 + below(most));
     for (auto& one : all) one = tame_picture();
     return all;
   }
@@ -99,7 +99,7 @@ class Maker {
       }
       case 5: {
         name("fade");
-        const Picture still = tame_picture();
+        const Levels still = tame_picture();
         const double factor = 0.5 + static_cast<double>(below(100)) / 100;
         Clip clip(pixels_, m);
         for (size_t t = 0; t < m; ++t)
@@ -110,7 +110,7 @@ class Maker {
       }
       case 6: {
         name("ramp");
-        const Picture still = picture(0, 100), slope = picture(0, 8);
+        const Levels still = picture(0, 100), slope = picture(0, 8);
         Clip clip(pixels_, m);
         for (size_t t = 0; t < m; ++t)
           for (size_t i = 0; i < still.size(); ++i)
@@ -141,7 +141,7 @@ class Maker {
       }
       case 10: {
         name("colours turn");
-        const Picture start = tame_picture();
+        const Levels start = tame_picture();
         Clip clip(pixels_, m);
         for (size_t t = 0; t < m; ++t)
           for (size_t c = 0; c < 3; ++c)
@@ -198,7 +198,7 @@ class Maker {
         break;
       default:
         name("a frame again");
-        clip->frames[below(m)] = Picture(clip->frames[below(m)]);
+        clip->frames[below(m)] = Levels(clip->frames[below(m)]);
         break;
     }
   }
@@ -263,7 +263,7 @@ Verdict judge(const Clip& clip, const DmdOptions& options, bool digits) {
   SlidingGram sliding(window.capacity());
   sliding.add_newest(window, window.size());
   const IntegerMatrix gram = sliding.matrix(window);
-  std::optional<Reference> reference;
+  std::optional<DecimalSolver> reference;
   Answer answer;
   if (digits) {
     reference.emplace(gram, pixels_of(clip));

@@ -29,11 +29,11 @@ struct Answer {
 
 // The same algorithm on the same window in `Decimal`. The Gram matrix is exact and 50 digits are
 // more than it can square away, so the factor is too.
-class Reference {
+class DecimalSolver {
  public:
   // `probes`: the pixels at which L(t) is compared, three channels each in `pixels`
   // (3 probes x m).
-  Reference(const IntegerMatrix& gram, Eigen::MatrixXd pixels);
+  DecimalSolver(const IntegerMatrix& gram, Eigen::MatrixXd pixels);
 
   Answer solve(const DmdOptions& options) const;
   // The same after a perturbation of every snapshot by `size` times the longest one, in a

@@ -1,4 +1,4 @@
-#include "tests/stability/reference.h"
+#include "tests/stability/decimal_solver.h"
 
 #include <random>
 
@@ -35,14 +35,14 @@ QuaternionMatrix<Decimal> shares_at(const QuaternionModes<Decimal>& modes, Eigen
 
 }  // namespace
 
-Reference::Reference(const IntegerMatrix& gram, Eigen::MatrixXd pixels)
+DecimalSolver::DecimalSolver(const IntegerMatrix& gram, Eigen::MatrixXd pixels)
     : factor_(factorize_gram(to_decimal(quaternion_gram(gram)))), pixels_(std::move(pixels)) {}
 
-Answer Reference::solve(const DmdOptions& options) const {
+Answer DecimalSolver::solve(const DmdOptions& options) const {
   return evaluate(reduced_qdmd(factor_, options));
 }
 
-Answer Reference::solve_perturbed(const DmdOptions& options, double size, unsigned seed) const {
+Answer DecimalSolver::solve_perturbed(const DmdOptions& options, double size, unsigned seed) const {
   std::mt19937 rng(seed);
   std::normal_distribution<double> normal;
   SnapshotFactor<Decimal> perturbed = factor_;
@@ -65,7 +65,7 @@ Answer Reference::solve_perturbed(const DmdOptions& options, double size, unsign
   return evaluate(reduced_qdmd(perturbed, options));
 }
 
-std::vector<double> Reference::singular_values() const {
+std::vector<double> DecimalSolver::singular_values() const {
   if (factor_.r.cols() < 2) return {};
   const auto past = factor_.r.left_cols(factor_.r.cols() - 1);
   const auto eigen = hermitian_eigen(past * past.conjugate_transpose());
@@ -76,7 +76,7 @@ std::vector<double> Reference::singular_values() const {
   return values;
 }
 
-Answer Reference::answer(const QuaternionModes<double>& modes) const {
+Answer DecimalSolver::answer(const QuaternionModes<double>& modes) const {
   QuaternionModes<Decimal> wide;
   wide.eigenvalues.resize(modes.eigenvalues.size());
   for (Eigen::Index p = 0; p < wide.eigenvalues.size(); ++p)
@@ -88,7 +88,7 @@ Answer Reference::answer(const QuaternionModes<double>& modes) const {
   return evaluate(wide);
 }
 
-Answer Reference::evaluate(const QuaternionModes<Decimal>& modes) const {
+Answer DecimalSolver::evaluate(const QuaternionModes<Decimal>& modes) const {
   const Eigen::Index m = factor_.r.cols(), probes = pixels_.rows() / 3;
   Answer answer;
   answer.rank = modes.summary.rank;
