@@ -133,11 +133,12 @@ void install_properties_and_signals(GObjectClass* klass, WhichSettings which) {
                          GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   g_object_class_install_property(
       klass, kBackgroundProperty,
-      g_param_spec_boxed("background", "Background",
-                         "The newest background picture in the output's caps, with the time of the "
-                         "frames that came out with its solve; null before the first solve. It is "
-                         "made when you ask, which waits for a solve that is under way",
-                         GST_TYPE_SAMPLE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+      g_param_spec_boxed(
+          "background", "Background",
+          "The newest background picture, in the output's caps, with the time of the "
+          "frames that came out with its solve; null before the first solve. It is "
+          "made when you read it, and reading waits for a solve that is running",
+          GST_TYPE_SAMPLE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   /**
    * GstQdmdBackground::reset:
    *

@@ -12,8 +12,8 @@ GType gst_qdmd_background_output_get_type() {
       {int(Output::background), "The background L(t) at the frame's time", "background"},
       {int(Output::foreground), "The residual of each channel, abs(x - L)", "foreground"},
       {int(Output::mask),
-       "White where the frame differs from the background by more than it does by itself, else "
-       "black; grey at its edges with mask-softness",
+       "White where the frame differs from the background by more than the background's own noise, "
+       "else black; grey at edges with mask-softness",
        "mask"},
       {int(Output::cutout),
        "The frame where the mask is white, elsewhere black (transparent with alpha)", "cutout"},
@@ -35,8 +35,8 @@ GType gst_qdmd_background_shadows_get_type() {
 GType gst_qdmd_background_mode_get_type() {
   static const GEnumValue values[] = {
       {int(qdmd::Mode::batch),
-       "Fill a window, solve, send a frame for each that comes, each with its own L(t); a latency "
-       "of window-size - 1 frames and what a solve takes",
+       "Fill a window, solve it, then send one frame for each that comes, each with its own L(t). "
+       "Latency: window-size - 1 frames and the time of a solve",
        "batch"},
       {int(qdmd::Mode::live),
        "Send each frame at once, against the newest model; solve every hop-size frames on the last "

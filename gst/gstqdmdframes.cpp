@@ -200,9 +200,10 @@ static void warn_of_no_room(GstElement* self) {
     return;
   GST_ELEMENT_WARNING(
       self, RESOURCE, NO_SPACE_LEFT,
-      ("The camera moves, and max-memory has no room for a second copy of the window, which "
-       "stabilize needs then: frames are taken as they come. Raise max-memory, lower window-size, "
-       "or set stabilize=off."),
+      ("The camera moves. To follow it, stabilize needs a second copy of the window, and "
+       "max-memory "
+       "has no room for it, so frames are not stabilized. Raise max-memory, lower window-size, or "
+       "set stabilize=off."),
       (nullptr));
 }
 
@@ -392,9 +393,9 @@ static void warn_of_breaks(GstElement* self, bool jump) {
   if (state->breaks < kMany || std::exchange(state->warned_of_breaks, true)) return;
   GST_ELEMENT_WARNING(
       self, STREAM, FORMAT,
-      ("Frames are too far apart in time to make a window: each begins a new one and is its own "
-       "background. More than one second and more than %d frames of the caps' framerate break "
-       "time: set the framerate at which they come, for instance with videorate.",
+      ("Frames are too far apart in time to form a window, so each frame is its own background. A "
+       "gap of more than one second and more than %d frames begins a new window: set the true "
+       "framerate, for instance with videorate.",
        kMostGapFrames),
       (nullptr));
 }

@@ -60,7 +60,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("hop-size", "Hop size",
                                 "Frames between solves in mode=live, at most window-size (0: a "
-                                "quarter of it)",
+                                "quarter of it). As long as the background stays as it is, "
+                                "method=robust solves one time in four at least",
                                 0, guint(EngineOptions::kMaxWindow), guint(d.engine.hop_size),
                                 kAtStart);
      },
@@ -97,8 +98,10 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum(
            "solver", "Solver",
-           "How the decomposition of method=qdmd and robust is computed; same picture, other cost: "
-           "one that gets nowhere hands on to a more careful one (not used by method=dmd)",
+           "How the decomposition of method=qdmd and robust is computed. All give the same picture "
+           "at "
+           "another cost. If a solver finds no result, a more careful one takes over (not used by "
+           "method=dmd)",
            gst_qdmd_background_solver_get_type(), gint(d.engine.dmd.solver), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.solver)},
@@ -145,9 +148,11 @@ const Property kProperties[] = {
      },
      QDMD_DOUBLE(s.engine.foreground_threshold)},
     {[](const Settings& d) {
-       return g_param_spec_uint64("max-memory", "Maximum memory",
-                                  "Bytes that the window and its models may take; more is an error",
-                                  0, G_MAXUINT64, d.engine.max_memory, kAtStart);
+       return g_param_spec_uint64(
+           "max-memory", "Maximum memory",
+           "Most bytes that the window and its models may take. If they need "
+           "more, the element stops with an error that names the size needed",
+           0, G_MAXUINT64, d.engine.max_memory, kAtStart);
      },
      [](Settings& s, const GValue* v) { s.engine.max_memory = g_value_get_uint64(v); },
      [](const Settings& s, GValue* v) { g_value_set_uint64(v, s.engine.max_memory); }},
@@ -161,8 +166,9 @@ const Property kProperties[] = {
      QDMD_UINT(s.engine.threads)},
     {[](const Settings& d) {
        return g_param_spec_boolean("freeze", "Freeze",
-                                   "Keep the background as it is and solve no more; before there "
-                                   "is a model, one is made (mode=batch: from the next window on)",
+                                   "Keep the background as it is and do not solve. If there is no "
+                                   "model yet, one is made first (mode=batch: from the next window "
+                                   "on)",
                                    d.freeze, kControllable);
      },
      QDMD_BOOLEAN(s.freeze)},
@@ -197,9 +203,10 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_double(
            "absorb-time", "Time to absorb",
-           "Seconds that something which came and stands still is foreground "
-           "before it becomes background (0: it never does); what leaves is "
-           "known at once (not used by method=qdmd and dmd)",
+           "If something comes and stands still, it is foreground for so many seconds and then "
+           "becomes background (0: it never does). If it leaves, that is noticed at once (not used "
+           "by "
+           "method=qdmd and dmd)",
            0, 1e6, d.absorb_time, kAnyTime);
      },
      QDMD_DOUBLE(s.absorb_time)},
@@ -213,9 +220,9 @@ const Property kProperties[] = {
      QDMD_ENUM(s.shadows)},
     {[](const Settings& d) {
        return g_param_spec_uint("mask-softness", "Softness of masks",
-                                "Pixels to either side of a mask's edge over which output=mask and "
-                                "cutout fade, along the edges of the picture and steadily from "
-                                "frame to frame (0: hard). Regions go by the hard mask",
+                                "Over how many pixels to either side the edge of a mask fades, in "
+                                "output=mask and cutout (0: hard). Soft edges follow the picture "
+                                "and are steady from frame to frame. Regions use the hard mask",
                                 0, guint(kMostSoftness), guint(d.engine.mask_softness),
                                 kControllable);
      },
@@ -249,9 +256,10 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum(
            "stabilize", "Stabilize",
-           "How a camera that shakes or drifts may move: frames are moved to where it saw the "
-           "background, up to an eighth of the picture, and masks and backgrounds back to where "
-           "it looks",
+           "How a camera that shakes or drifts may move. Frames are moved back to the camera's "
+           "first "
+           "place, by up to an eighth of the picture; masks and backgrounds are sent as the camera "
+           "sees them",
            gst_qdmd_background_stabilize_get_type(), gint(d.engine.stabilize), kAtStart);
      },
      QDMD_ENUM(s.engine.stabilize)},
