@@ -469,6 +469,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       divide_time(stride_, &facts_.dmd);
       model->begin(snapshots, decomposition.background, true);
       model->set_stride(stride_);
+      model->make_steady();
       combine(snapshots, model);
       take_reference(model, snapshots_->size() / 2);
     }
