@@ -32,9 +32,8 @@ class BackgroundModel {
   void build_from(const uint8_t* const* planes, size_t first, size_t count);
   // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
   void set_stride(int frames) { stride_ = frames; }
-  // Frames of one block of kSteadyFrames share the weights of its middle, where this moves no pixel
-  // of L(t) by kSteadyLevels: who compares them with L need not make it anew for each. Until
-  // begin().
+  // Frames of one block of kSteadyFrames share the weights of its middle, if this moves no pixel of
+  // L(t) by kSteadyLevels: L need not be made anew for each of them. Until begin().
   void make_steady() { steady_ = true; }
   static constexpr int kSteadyFrames = 10;
   static constexpr double kSteadyLevels = 0.125;

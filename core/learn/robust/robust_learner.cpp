@@ -33,9 +33,9 @@ int most_snapshots(int window_size) {
 // One frame in so many may be remembered, for so many windows.
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
 
-// A solve changed little where cells moved by less than a level in each channel on average, and
-// but a twentieth of them by two: noise and clouds stay below that, a background that is still
-// found does not.
+// A solve changed little if cells moved by less than a level in each channel on average, and
+// and no more than a twentieth of them by two. Noise and clouds stay below that; a background of
+// which parts are still hidden does not.
 constexpr float kCalmMean = 3, kCalmCell = 6, kMostMoved = 0.05f;
 
 // Of frames that are one frame apart, from one of frames that are `stride` apart.
@@ -224,7 +224,7 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
   // A window that is solved as a whole knows by itself what was uncovered, unless it was absorbed.
   if (frame.live || absorbed_.any()) {
     std::vector<int> uncovered = looks_.uncovered(background);
-    if (looks_.any_differ()) calm_ = 0;
+    if (looks_.any_news()) calm_ = 0;
     if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
     mend(uncovered, frame, light, model);
   }
