@@ -15,8 +15,8 @@ struct GreyView {
   int width = 0, height = 0;
 };
 
-// Global light: grey levels of a frame are gain * (level - 128) + 128 + offset, less that of the
-// landmarks' own picture.
+// Light over the whole picture: the grey levels of a frame are (1 + gain) * (level - 128) + 128 +
+// offset, where `level` is a level of the landmarks' own picture.
 struct GreyLight {
   double gain = 0, offset = 0;
 };
@@ -26,8 +26,8 @@ struct Fit {
   Pose pose;         // of the frame, by one step of Gauss and Newton
   GreyLight light;   // over the landmarks' picture
   double noise = 0;  // levels: the standard deviation of those landmarks that fit
-  // Share of the landmarks inside of the frame that fit before the step, the better the more (1
-  // less Tukey's loss), 0 .. 1.
+  // Share of the landmarks inside the frame that fit before the step, 0 .. 1. Each counts the more
+  // the better it fits: 1 less Tukey's loss.
   double agree = 0;
   double error = 0;    // pixels: the standard deviation of the step's shift
   bool known = false;  // there were enough of them
@@ -40,19 +40,19 @@ class Landmarks {
   explicit Landmarks(int most = 0);
   static uint64_t bytes(int most);
 
-  // Those of `picture`, in place of the old ones; none where `ignored` is.
+  // Chooses landmarks of `picture` in place of the old ones; none of them is in `ignored`.
   void choose(const GreyView& picture, const IgnoredAreas& ignored, int ignored_scale);
   int count() const { return count_; }
-  // How many of 4 x 4 parts of the picture have some. Those of one thing before a bare wall are in
-  // a few, and move with it.
+  // How many of 4 x 4 parts of the picture have landmarks. If all of them belong to one thing in
+  // front of a bare wall, they are in a few parts only, and move with that thing.
   int parts() const;
   // Landmarks that are needed to say anything.
   static constexpr int kFewest = 12;
 
   // Compares a frame, seen from `pose`, with the landmarks' picture: the inverse compositional step
-  // (Baker and Matthews 2004) with Tukey's weights, their scale from the residuals' lower part, so
-  // that what moves before more than half of the landmarks does not count. turns: angle and scale
-  // are free, too. noise: in place of what the residuals say, or 0.
+  // (Baker and Matthews 2004) with Tukey's weights. Their scale comes from the lower part of the
+  // residuals, so that things that move in front of more than half of the landmarks do not count.
+  // turns: angle and scale are free, too. noise: taken in place of the residuals' own; 0: not.
   Fit step(const GreyView& frame, const Pose& pose, const GreyLight& light, bool turns,
            double noise = 0);
   // The share of the landmarks that a frame fits at a whole shift by less than `limit` levels.

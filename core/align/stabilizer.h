@@ -18,11 +18,11 @@ enum class Stabilize {
   similarity    // and is turned, and sees more or less
 };
 
-// Frames are compared with the first one, and then with the background that was learnt. The canvas
-// is the first frame; if the camera moves at once, it is moved by less than a pixel once the first
-// few have come, to where the sharpest of them falls on whole pixels, so that this one is not
-// blurred by interpolation. A camera that looks further beside its place than an eighth of the
-// picture shows another view: the canvas is then the newest frame.
+// Frames are compared with the first one, and later with the background that was learnt. The canvas
+// is the first frame. If the camera moves from the beginning, the canvas is moved by less than a
+// pixel after the first few frames, to where the sharpest of them falls on whole pixels:
+// interpolation then does not blur that frame. If the camera looks further beside its place than an
+// eighth of the picture, it shows another view, and the newest frame is the canvas.
 class Stabilizer {
  public:
   // Takes all memory. For frames of width x height pixels.
@@ -33,23 +33,23 @@ class Stabilizer {
   void forget();
   // The next frame begins a new scene, and is its canvas.
   void begin_scene();
-  // The newest frame is of another view, on which the camera went.
+  // True if the newest frame shows another view, to which the camera moved.
   bool began_view() const { return began_view_; }
   // The channel that frames are compared by.
   int channel() const { return channel_; }
 
-  // The pose that the next frame is moved from, whose channel is `grey`. Where too little is seen
-  // of the scene, that of the frame before.
+  // The pose from which the next frame is moved; `grey` is a channel of that frame. If it shows too
+  // little of the scene, this is the pose of the frame before.
   Pose follow(const uint8_t* grey, const IgnoredAreas& ignored);
-  // Where the newest frame's canvas is on that of the frames before; at rest nearly always.
+  // Where the newest frame's canvas lies on the canvas of the frames before; nearly always at rest.
   const Pose& canvas_moved() const { return canvas_moved_; }
   // The background picture that frames are compared with from now on.
   void refer_to(const uint8_t* grey, const IgnoredAreas& ignored);
   // Frames since that.
   int64_t frames_since_reference() const { return since_reference_; }
 
-  // Where the newest frame's camera looked. Frames are only moved once it was further off than the
-  // width of an edge: interpolation blurs more than less does.
+  // Where the camera looked in the newest frame. Frames are moved only once the camera was further
+  // off than the width of an edge: for less, interpolation would blur more than the motion does.
   const Pose& motion() const { return pose_; }
   // Frames in a row that showed too little of the scene, the newest included.
   int lost() const { return lost_; }

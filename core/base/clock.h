@@ -9,8 +9,9 @@
 
 namespace qdmd {
 
-// One clock is passed down to all who work on frames, the caller of the engine included. Any thread
-// may charge it; what is read while others work is what they had charged by then.
+// One clock is passed down to all code that works on frames; the engine's caller charges it, too.
+// Any thread may charge it. If you read it while others work, you see what they have charged so
+// far.
 class Clock {
  public:
   enum Work : size_t {
@@ -28,7 +29,7 @@ class Clock {
    public:
     double of(Work work) const { return seconds_[work]; }
     double of_solves() const { return of(solving) + of(pictures) + of(samples); }
-    // Of threads that worked.
+    // All seconds in which threads worked, without waiting.
     double all() const { return of(frames) + of(products) + of_solves(); }
     Spent since(const Spent& earlier) const {
       Spent difference;
@@ -46,8 +47,8 @@ class Clock {
   // For work that was timed elsewhere, as tests do.
   void charge(Work work, double seconds);
 
-  // Charges the time that it lives to one kind of work, less that of spans inside it on the same
-  // thread.
+  // Charges the time for which it lives to one kind of work, less the time of spans inside it on
+  // the same thread.
   class Span {
    public:
     Span(Clock& clock, Work work);

@@ -1,4 +1,4 @@
-// A picture in somebody else's memory.
+// A view of a picture whose memory belongs to others.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +6,8 @@
 
 namespace qdmd {
 
-// How the samples of one channel lie: that of pixel (x, y) is y / rows * row_stride +
-// x / columns * pixel_stride bytes from its first one.
+// How the samples of one channel lie: the sample of pixel (x, y) is y / rows * row_stride +
+// x / columns * pixel_stride bytes behind the channel's first one.
 struct Spacing {
   ptrdiff_t pixel_stride = 0, row_stride = 0;  // bytes
   int columns = 1, rows = 1;                   // of pixels that share a sample: 1 or 2
@@ -25,15 +25,15 @@ struct BasicImageView {
   // True: samples at `alpha` are padding; they are not read and are written as 255.
   bool alpha_is_padding = false;
   int width = 0, height = 0;
-  // Of all channels and alpha that have none of their own.
+  // Of all channels, and of alpha, unless they have a spacing of their own.
   ptrdiff_t pixel_stride = 0, row_stride = 0;  // bytes
-  // Of channels 0 to 2 and of alpha (3), where its pixel_stride is not 0.
+  // The own spacing of channels 0 to 2 and of alpha (3); none if its pixel_stride is 0.
   Spacing own[4];
 
   Spacing spacing(int c) const {
     return own[c].pixel_stride != 0 ? own[c] : Spacing{pixel_stride, row_stride, 1, 1};
   }
-  // All are at the same distances.
+  // True if no channel has a spacing of its own.
   bool is_even() const {
     for (const Spacing& spacing : own)
       if (spacing.pixel_stride != 0) return false;

@@ -24,8 +24,7 @@ struct MaskWishes {
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
-// thread, one at a time; publish() then makes it the one in use. All other calls are about the one
-// in use.
+// thread, one at a time; publish() then puts it in use. All other calls are about the model in use.
 class Background {
  public:
   // Learnt anew with each solve; or held as it was; or held, but for the light of each frame.
@@ -41,17 +40,17 @@ class Background {
   void begin_scene();
   // The same, and there is no background until then.
   void begin_scene_at_once();
-  // The scene of what was learnt is back, and its background the one in use, in the light of each
-  // frame. Where it throws, nothing is known.
+  // The camera shows the scene of `learnt` again: its background is in use, in the light of each
+  // frame. If it throws, nothing is known.
   void return_to(const Learnt& learnt);
 
-  // What is known, with the L of the time and light that the model is set to.
+  // Writes all that is known into `learnt`, with L at the time and light that the model is set to.
   void remember(Learnt* learnt) const;
-  // The solves to come are told of it as of a window before them. Not while one runs, and neither
-  // is show(). Where it throws, all is as it was.
+  // The next solves take it for the background of the window before them. Call neither this nor
+  // show() while a solve runs. If it throws, nothing has changed.
   void recall(const Learnt& learnt) { learner_->recall(learnt); }
-  // Its picture is the one in use, and held, until publish(). Throws only where make_room() was not
-  // called before; where that throws, all is as it was.
+  // Puts its picture in use, and holds it until publish(). Throws only if make_room() was not
+  // called before; if make_room() throws, nothing has changed.
   void show(const Learnt& learnt, State state);
   void make_room() { model().make_room(pixels(), learner_->makes_limits()); }
 
@@ -76,8 +75,8 @@ class Background {
   uint64_t solves() const { return solves_; }
   State state() const { return state_; }
 
-  // Holds the L(t) in use, or goes on holding it, in another state. The snapshots are then no
-  // longer needed.
+  // Holds L(t) at this time t, or goes on holding L in another state. The snapshots are no longer
+  // needed then.
   void hold(double t, State state);
   // L is as it is until publish(), but held no longer.
   void learn() { state_ = State::learnt; }

@@ -8,13 +8,13 @@
 
 namespace qdmd {
 
-// A window is collected; its frames enter the Gram matrix in groups, beside those that follow. The
-// last one begins the solve, which has until `late_frames` frames later (0: it is done at once).
-// From then on a frame of the window leaves with each that comes, while the next window is
-// collected: a frame waits for window_size - 1 + late_frames others, whatever time a solve takes.
-// Where the background is held, which is decided when a window begins, its frames wait all the
-// same. What drain() finds in an unfinished window is solved with as many frames before it as make
-// a window.
+// A window is collected. Its frames enter the Gram matrix in groups, while further frames come. The
+// window's last frame begins the solve, which must end `late_frames` frames later (0: it is done at
+// once). From then on a frame of the window leaves with each frame that comes, while the next
+// window is collected. So a frame waits for window_size - 1 + late_frames others, whatever time a
+// solve takes. Whether the background is held is decided when a window begins; frames of such a
+// window wait as long. drain() solves an unfinished window together with as many frames before it
+// as make it whole.
 class BatchSchedule : public Schedule {
  public:
   // late_frames < window_size.
@@ -29,7 +29,7 @@ class BatchSchedule : public Schedule {
   int frames_left(const Queue& queue) const override;
 
  private:
-  // Frames [begin, end) that leave with one background; frames are counted as the store does.
+  // Frames [begin, end) that leave with one background, by their numbers in the store.
   struct Stretch {
     int64_t begin = 0, end = 0;
     int64_t time_zero = 0;  // the first snapshot of its model

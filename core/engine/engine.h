@@ -9,24 +9,26 @@
 
 namespace qdmd {
 
-// Batch: push() collects window_size frames, which are then solved, at once or beside the frames
-// that follow; from then on a frame is ready with each that is pushed, in order, each against its
-// own window's L(t), delay() frames later. drain() makes all ready; a remainder is solved on the
-// last window_size frames seen (fewer where the stream is shorter). Live: each push() makes its
-// frame ready, against the newest model, extrapolated to the frame's time. A solve on the last
-// window_size frames begins every hop_size frames, earlier while the window fills up, and its work
-// is spread over the frames that follow (LivePlan). drain() begins a new window and keeps the
-// background as it is until there is a new model. Every frame pushed is popped exactly once, unless
-// flush() drops it. Results do not depend on the number of threads or on time. Not thread safe.
-// Throws std::bad_alloc where memory runs out. Frames that wait are lost then, as after flush(),
-// and the engine goes on with the next frame; after configure() it is not configured.
+// Batch: push() collects window_size frames. The window is then solved, at once or beside the
+// frames that follow. From then on one frame becomes ready with each push(), in order, delay()
+// frames after it came, against its own window's L(t). drain() makes all frames ready. If an
+// unfinished window is left, it is solved on the last window_size frames seen (or on fewer, if the
+// stream is shorter).
+// Live: each push() makes its frame ready, against the newest model, extrapolated to the frame's
+// time. A solve on the last window_size frames begins every hop_size frames, and earlier while the
+// window fills up. Its work is spread over the frames that follow (LivePlan). drain() begins a new
+// window and keeps the background as it is until there is a new model.
+// Every frame pushed is popped exactly once, unless flush() drops it. Results do not depend on the
+// number of threads or on time, unless there is a time budget. Not thread safe. Throws
+// std::bad_alloc if memory runs out: frames that wait are then lost, as after flush(), and the
+// engine goes on with the next frame. If configure() throws it, the engine is not configured.
 class Engine {
  public:
   Engine() = default;
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  // Starts afresh with frames of width x height pixels. Where it refuses, all is as it was.
+  // Starts afresh with frames of width x height pixels. If it refuses, nothing has changed.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
   // Gives all memory and threads back; configure() comes next.
@@ -34,47 +36,49 @@ class Engine {
 
   // Copies a frame in.
   Status push(const ImageView& frame);
-  // The newest push() took longer than a frame alone does: work of a solve was done in it, for want
-  // of a thread or because it was due, or waited for.
+  // True if the newest push() took longer than one frame needs: it waited for a solve, or did work
+  // of a solve itself, because no thread was free or because the solve was due.
   bool held_up() const { return schedule_ && schedule_->held_up(); }
   // True while pop() has a frame.
   bool ready() const { return queue_.ready > 0; }
-  // Writes a picture of the next frame, which stays the next: any number of pictures share what is
-  // computed of it. Call only while ready(); `out` has the configured size. Its black, white and
-  // neutral chroma are `levels`: the configured ones, or, of a mask in another format, its own.
+  // Writes a picture of the next frame, which stays the next frame: any number of pictures can be
+  // made from one computation. Call only while ready(); `out` has the configured size. `levels` are
+  // its black, white and neutral chroma: the configured ones, or, for a mask in another format, the
+  // levels of that format.
   void write(Output output, const Levels& levels, const MutableImageView& out);
-  // The next frame has left. Call only while ready().
+  // Call it when the next frame has left, and only while ready().
   void skip();
   // write() in the configured levels, and skip().
   void pop(Output output, const MutableImageView& out);
-  // Of the frame that leaves next, width * height samples each: its mask, as Output::mask has
-  // it, and the lengths of its residuals in levels, at most 255. Call only while ready().
+  // Gives the mask of the frame that leaves next, as in Output::mask, and the lengths of its
+  // residuals in levels, at most 255; width * height samples each. Call only while ready().
   void foreground(uint8_t* mask, uint8_t* residual);
-  // Writes the newest background: that of the last frame of a batch that was solved for, or of the
-  // frame with which a live model came; or the one that is held. False: there is none yet.
+  // Writes the newest background. Batch: the background of the last frame of the newest solved
+  // window. Live: of the frame with which the newest model came. While a background is held: that
+  // one. False: there is none yet.
   bool write_background(const MutableImageView& out);
-  // What was learnt of the background that write_background() writes, with its picture; its colours
-  // are the caller's. False: nothing yet. Waits for a solve that is under way. Where it throws, no
-  // frame is lost.
+  // Gives all that was learnt about the background that write_background() writes, with its
+  // picture; the caller sets its colours. False: nothing is learnt yet. Waits for a solve that is
+  // under way. If it throws, no frame is lost.
   bool learnt(Learnt* learnt);
-  // Goes on with what an earlier run learnt: the background is held until there is a model of this
-  // one's frames, as after drain(), and method=robust is told of it as of a window before. Live: at
-  // once, and the next frame begins a new window. Batch: windows that end from now on are told; the
-  // picture is used where there is no background yet, or no frame waits, or by the next window that
-  // begins, if it is held. Not ok where the size is another; all is then as it was. Waits, and
-  // throws, as learnt() does.
+  // Goes on from what an earlier run learnt. This background is held until there is a model of this
+  // run's frames, as after drain(), and method=robust takes it for the background of the window
+  // before. Live: it is used at once, and the next frame begins a new window. Batch: windows that
+  // end after this call learn from it. Its picture is used if there is no background yet or no
+  // frame waits; else by the next window that begins, if that one is held. Not ok if the size is
+  // another; nothing has changed then. Waits and throws like learnt().
   Status learn_from(const Learnt& learnt);
-  // What learn_from() would say.
+  // The status that learn_from() would return.
   Status may_learn_from(const Learnt& learnt) const;
-  // Makes every waiting frame ready; their windows may be solved as they are popped. The frame
-  // after it belongs to a new window: time is broken.
+  // Makes every waiting frame ready; windows may be solved as their frames are popped. The next
+  // frame that is pushed begins a new window.
   Status drain();
   // Drops all frames and forgets the window and the model.
   void flush();
 
   // Frames that are pushed before a frame leaves: EngineLayout::delay.
   int delay() const { return layout_.delay; }
-  // Of the frames that wait, the next so many leave with the background that report() is about.
+  // So many of the frames that wait leave with the background that report() is about.
   int frames_left() const { return schedule_ ? schedule_->frames_left(queue_) : 0; }
   // Frames pushed and not popped.
   int pending() const { return queue_.pending; }
@@ -83,28 +87,30 @@ class Engine {
   uint64_t scenes() const { return schedule_ ? schedule_->scenes() : 0; }
   uint64_t solves() const { return background_ ? background_->solves() : 0; }
   SolveReport report() const { return background_ ? background_->report() : SolveReport(); }
-  // The bytes that count against max_memory: those of EngineLayout, and, once alpha varies or a
-  // mask is soft, their own.
+  // The bytes that count against max_memory: the bytes of EngineLayout, and the bytes for alpha
+  // that varies and for soft masks once there are any.
   uint64_t bytes() const;
 
   // A pixel is foreground above this quaternion norm; 0: from the noise. Takes effect at once.
   void set_foreground_threshold(double threshold);
   // Pixels to either side of a mask's edge over which Output::mask and cutout fade, 0 (hard) to
-  // kMostSoftness. Takes effect at once; foreground() stays hard. Where configure() was told of
-  // none, the first soft mask takes memory that max_memory does not know of.
+  // kMostSoftness. Takes effect at once; foreground() stays hard. If the options of configure()
+  // had 0, the first soft mask takes memory that does not count against max_memory.
   void set_mask_softness(int pixels) { options_.mask_softness = pixels; }
-  // Where nothing is foreground, and masks learn nothing. Of the frame that pop() gives next; and
-  // of a window whose last frame push() takes next: of its statistics, and of what batch learns
-  // from its first one. Takes effect at once. The background is learnt there as everywhere.
+  // Areas in which nothing is foreground, and masks learn nothing. They hold for the frame that
+  // pop() gives next; for the statistics of the window whose last frame push() takes next; and, in
+  // batch, for what masks learn from the first window. Takes effect at once. The background is
+  // learnt there as everywhere.
   void set_ignored(const IgnoredAreas& areas);
-  // Whether somebody is going to ask for masks, cut-outs or foreground(). If not, batch saves the
-  // time in which it learns, from its first window, what masks need; who asks all the same has
-  // masks that learn as frames are decided. True unless it is set.
+  // False: nobody is going to ask for masks, cut-outs or foreground(). Batch then saves the time
+  // in which it learns from its first window for masks. If you ask for masks all the same, they
+  // learn from frame to frame. True unless it is set.
   void set_masks_expected(bool expected);
-  // Frames that something which came and stands still is foreground before it is background; 0: it
-  // never is. What leaves is known at once. Takes effect with the next frame. Method::robust only.
+  // Something that came and stands still is foreground for so many frames and then becomes
+  // background; 0: it never does. Something that leaves is noticed at once. Takes effect with the
+  // next frame. Method::robust only.
   void set_absorb_frames(int64_t frames);
-  // What masks make of pixels that only light tells from the background. Takes effect at once.
+  // What pixels become in masks if they are the background in another light. Takes effect at once.
   void set_shadows(Shadows shadows);
   // While on, pop() and foreground() give the steady picture: frames, masks and backgrounds as they
   // are on the canvas. Takes effect at once. EngineOptions::stabilize.
@@ -113,22 +119,24 @@ class Engine {
   // (at rest where none waits).
   Pose newest_pose() const { return stabilizer_ ? stabilizer_->motion() : Pose(); }
   Pose next_pose() const;
-  // How often the camera went on, further than an eighth of the picture, to another view.
+  // How often the camera moved further than an eighth of the picture, to another view.
   uint64_t views() const { return stabilizer_ ? stabilizer_->views() : 0; }
-  // max_memory has no room to hold frames of a camera that moves: they are taken as they come.
+  // True if max_memory has no room for a second copy of frames that are moved: frames are then
+  // taken as they come.
   bool has_no_room_for_motion() const { return schedule_ && schedule_->has_no_room(); }
-  // While on, the background stays the picture that it was, and nothing is solved; only the first
-  // model is made all the same. Batch: decided when a window begins.
+  // While on, the background stays the picture that it is, and nothing is solved. If there is no
+  // model yet, a first one is made all the same. Batch: decided when a window begins.
   void set_freeze(bool freeze) { freeze_ = freeze; }
-  // Seconds that a frame may take on average; 0: no limit. Solves are given the effort that fits,
-  // at most what the options say (TimeBudget), and pictures then depend on time.
+  // Seconds that a frame may take on average; 0: no limit. Each solve gets the effort that fits
+  // (TimeBudget), at most as much as the options say. Pictures then depend on time.
   void set_time_budget(double seconds_per_frame) { pace_.set_budget(seconds_per_frame); }
   const TimeBudget& time_budget() const { return pace_.budget(); }
-  // Where the caller charges what a frame takes beside push() and pop(), for instance to be
-  // converted: it counts.
+  // Here the caller charges the time that a frame takes beside push() and pop(), for instance for a
+  // conversion. It counts in the time budget.
   Clock& clock() { return clock_; }
-  // As EngineOptions::threads. Takes effect with a frame that finds no solve under way. More
-  // threads than configure() was told of take memory that max_memory does not know of.
+  // As EngineOptions::threads. Takes effect with the first frame that comes while no solve is under
+  // way. If these are more threads than in the options of configure(), their memory does not count
+  // against max_memory.
   void set_threads(int threads);
 
  private:

@@ -9,9 +9,9 @@
 
 namespace qdmd {
 
-// What the plan has for a frame runs on the side thread until the next frame comes, or at once
-// where it is little or where there is no model yet. A solve in one piece goes on over several
-// frames. Models are therefore published at fixed frames. After a break the background is held
+// The work that the plan has for a frame runs on the side thread until the next frame comes. It is
+// done at once if it is little work, or if there is no model yet. A solve in one piece goes on over
+// several frames. So models are published at fixed frames. After a break the background is held
 // until there is a new model.
 class LiveSchedule : public Schedule {
  public:
@@ -40,8 +40,9 @@ class LiveSchedule : public Schedule {
     int64_t first_frame;
   };
 
-  // A solve in one piece: it goes on beside the frames until the frame before which it must end. So
-  // that this one does not wait for all of it, each waits for its share of what the last one took.
+  // A solve in one piece: it goes on beside the frames until frame `due`, before which it must end.
+  // If only that frame waited, it could wait long. So each frame waits for its share of the time
+  // that the last solve took.
   struct Piece {
     int64_t from, due;
     std::chrono::steady_clock::time_point begun;

@@ -1,4 +1,4 @@
-// When frames are learnt from, and when they may leave: what batch and live differ in.
+// When the background learns from frames, and when frames may leave: batch and live differ in this.
 #pragma once
 
 #include <functional>

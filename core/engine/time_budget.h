@@ -1,4 +1,4 @@
-// What effort a background is given, so that a frame takes no longer than somebody asked for.
+// How much work a background gets, so that a frame takes no longer than the user allows.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace qdmd {
 
-// What a background is given.
+// How much work a background gets.
 struct Effort {
   int period = 1;       // of so many windows (live: hops) one is solved
   int sample_step = 1;  // the decomposition sees every k-th pixel in x and y
@@ -23,8 +23,8 @@ struct SolveCost {
 };
 
 // The efforts that are worth their time (docs/accuracy-vs-time.md), the best first: each takes less
-// time than the one before it. Fewer samples, and only then fewer solves, which keep a background
-// that ages. sample_steps: those that can be had, the finest first.
+// time than the one before it. Samples become fewer first. Solves become fewer only then, because
+// the background gets old between them. sample_steps: the steps to choose from, the finest first.
 std::vector<Effort> front_of_efforts(const std::vector<int>& sample_steps);
 
 // What a frame takes with an effort, learnt from stretches of frames.
@@ -53,9 +53,9 @@ class CostModel {
 };
 
 // Frames come in stretches: windows in batch mode, hops in live mode. A stretch is solved, or keeps
-// the background that there is. What both take is measured, and the cost model made of it says
-// which is the best effort that fits. What a stretch took too much is paid back: the next solve
-// waits.
+// the background that there is. The time of both is measured, and the cost model learns from it
+// which is the best effort that fits. If a stretch took too long, the next solve waits until that
+// time is saved again.
 class TimeBudget {
  public:
   // More seldom than once in so many stretches makes hardly anything cheaper.
@@ -63,8 +63,8 @@ class TimeBudget {
 
   // Starts afresh. front: not empty, the best first. frames: of a stretch.
   void begin(std::vector<Effort> front, int frames);
-  // Seconds that a frame may take; 0: no limit, each stretch has the best effort. What was
-  // measured, and what is owed, is kept.
+  // Seconds that a frame may take; 0: no limit, each stretch has the best effort. Measured costs
+  // and time that is owed are kept.
   void set(double seconds_per_frame);
   bool limited() const { return budget_ > 0; }
 
@@ -72,8 +72,8 @@ class TimeBudget {
   bool next(int enough = 1);
   // The next stretch is solved, whatever is owed: it begins a new scene, or nobody knows it.
   void solve_next() { since_solve_ = 0; }
-  // What that stretch took in all, and, where it was solved, what its solve took of it. One that
-  // ended early says little of others: it is only paid.
+  // The seconds that this stretch took in all, and the part of its solve, if it was solved. A
+  // stretch that ended early says little about others: its time counts, but no cost is learnt.
   void add(int frames, double seconds, const SolveCost& solve);
 
   // Of the stretches from now on.
@@ -92,8 +92,8 @@ class TimeBudget {
   int frames_ = 1;       // of a stretch
   Effort given_;         // to the newest one
   int since_solve_ = 0;  // stretches since the newest that was solved, that one included
-  // What would have fitted with room since so many stretches, all of them better than what is
-  // chosen.
+  // The best effort that fitted with room to spare in each of the last comfortable_for_ stretches;
+  // it is better than the chosen one.
   size_t comfortable_ = 0;
   int comfortable_for_ = 0;
   double debt_ = 0;  // seconds taken above the budget

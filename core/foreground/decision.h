@@ -29,7 +29,7 @@ struct Comparison {
   const BackgroundModel* model;     // at the frame's time
   double threshold = 0;             // quaternion norm in levels above which a pixel differs
   const uint8_t* limits = nullptr;  // the same of each pixel, where that is more; or null
-  // Somebody asked for this threshold: it holds in textures that move, too.
+  // The user set this threshold: it holds in textures that move, too.
   bool fixed = false;
   // Where all is background, whatever the frame shows, and nothing is learnt from it; or null.
   const IgnoredAreas* ignored = nullptr;
@@ -58,7 +58,8 @@ class Decision {
   // True where no frame was decided since forget().
   bool new_born() const { return frames_ == 0; }
 
-  // Decides the next frame: what follows is about it. pool: or null. Results do not depend on it.
+  // Decides the next frame; the calls below are about this frame. pool may be null. Results do not
+  // depend on it.
   void decide(const Comparison& frame, Pool* pool);
   // 255 where foreground, else 0; width * height samples in row order.
   const uint8_t* mask() const { return of_.mask.data(); }

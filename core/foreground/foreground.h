@@ -49,13 +49,13 @@ struct OutputTask {
   bool soft = false;       // the mask
   // Samples of black.
   uint8_t black[3] = {0, 0, 0};
-  // L at that time, where somebody has made it, in rows that are `level_stride` samples apart; or
+  // L at that time, if it is already computed, in rows that are `level_stride` samples apart; or
   // nulls.
   const uint8_t* level[3] = {nullptr, nullptr, nullptr};
   size_t level_stride = 0;
 
-  // L of pixels left .. left + count - 1 of a row, of `width` pixels, made in `room` where nobody
-  // has.
+  // L of pixels left .. left + count - 1 of a row that is `width` pixels wide. It is computed into
+  // `room` unless `level` has it.
   void find_level(size_t y, size_t left, size_t count, size_t width, uint8_t* const room[3],
                   const uint8_t* out[3]) const {
     if (!level[0]) model->evaluate(y * width + left, count, room);

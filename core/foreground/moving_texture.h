@@ -11,13 +11,13 @@
 namespace qdmd {
 
 // Statistics of the cells of a coarse grid. A pixel that differs from the background is explained
-// where it looks like the background next to it: leaves and edges were there a moment ago, a person
-// who comes was not. It is restless where it is not as it was in the frame before: leaves are, a
-// person who stands is not, even where the background shows the same person a little beside. A cell
-// moves where, in the cells around it, enough pixels differ, enough of these are explained and
-// restless, and where this never stopped and never was much more: the share of pixels that differ
-// has hardly been below its average, and is not far above it now. (People stay, too, but they were
-// not there from the beginning.)
+// if it looks like the background next to it: leaves and edges were there a moment ago, but a
+// person who comes was not. It is restless if it is not as it was in the frame before. Leaves are
+// restless; a person who stands is not, even if the background shows the same person a little
+// beside. A cell moves if, in the cells around it, enough pixels differ, and enough of these are
+// explained and restless. It must always have been so: the share of pixels that differ has hardly
+// been below its average, and is not far above it in the newest frame. (People stay, too, but they
+// were not there from the beginning.)
 class MovingTexture {
  public:
   // Pixels of a cell on one row: 255 where they differ; squared distances from the background, from

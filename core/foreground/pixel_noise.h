@@ -10,9 +10,9 @@
 
 namespace qdmd {
 
-// A mean distance of each pixel, in 1/256 level, which follows the newest frames. What is
-// foreground for a moment, and was not in the frame before, counts as well: lamps and blocks of
-// compressed video that come and go raise the mean until they are background, people come too
+// A mean distance of each pixel, in 1/256 level, which follows the newest frames. A pixel that is
+// foreground for a moment, and was not in the frame before, counts as well. Lamps and blocks of
+// compressed video that come and go raise the mean until they are background; people come too
 // seldom for that.
 class PixelNoise {
  public:
@@ -28,9 +28,9 @@ class PixelNoise {
   bool learns_from(int y) const { return (y + frames_) % kRows == 0; }
   // Before the next frame's mask takes the place of this one, width * height samples.
   void remember(const uint8_t* mask);
-  // Of such a row, pixels left .. left + count - 1 of squared distance squared[p], with their own
-  // limits in levels: near[p] is 0 where they are background, and not next to foreground; now: the
-  // mask. Threads have rows of their own.
+  // Learns from pixels left .. left + count - 1 of such a row. squared: squared distances; limit:
+  // the pixels' own limits in levels; near: 0 for background that is not next to foreground; now:
+  // the mask. Each row is one thread's.
   void learn(int y, size_t left, size_t count, const uint16_t* squared, const uint8_t* limit,
              const uint8_t* near, const uint8_t* now);
   // After the last row of a frame.

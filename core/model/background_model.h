@@ -12,9 +12,9 @@
 
 namespace qdmd {
 
-// L(t) of one solved window. A few modes are kept as pictures, which makes a frame cost 3 K
-// products per pixel; many modes, whose pictures would take more memory than the window itself,
-// combine the window's frames directly at 9 m products per pixel.
+// L(t) of one solved window. A few modes are kept as K pictures; a frame then costs 3 K products
+// per pixel. The pictures of many modes would take more memory than the window itself: the window's
+// frames are then combined directly, at 9 m products per pixel.
 class BackgroundModel {
  public:
   // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
@@ -37,16 +37,16 @@ class BackgroundModel {
   void make_steady() { steady_ = true; }
   static constexpr int kSteadyFrames = 10;
   static constexpr double kSteadyLevels = 0.125;
-  // Of the frames from the first snapshot on: L(t) is multiplied by them, at other times by the
-  // nearest one. Kept until begin().
+  // One gain for each frame from the first snapshot on. L(t) is multiplied by the gain of time t,
+  // or of the nearest time that has one. Kept until begin().
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
   // For set_time() from now on, in place of the snapshots' gains.
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
-  // That of time t.
+  // The gain at time t.
   Gain light(double t) const;
 
-  // Of each pixel, in levels: what its residual must exceed to be foreground where nobody asks for
-  // a threshold. Room for them, kept until begin().
+  // Room for one limit for each pixel, in levels: the pixel is foreground if its residual exceeds
+  // the limit and no threshold is set. Kept until begin().
   uint8_t* make_limits() {
     limits_.resize(pixels_);
     return limits_.data();
@@ -54,8 +54,8 @@ class BackgroundModel {
   // Null: there are none.
   const uint8_t* limits() const { return limits_.empty() ? nullptr : limits_.data(); }
 
-  // What a model of a window of `snapshots` takes with up to so many pictures of modes, without
-  // limits.
+  // The bytes that a model of a window of `snapshots` takes with up to so many pictures of modes,
+  // without limits.
   static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures);
 
   // True where so many pictures of modes would take more memory than their window.
@@ -66,7 +66,7 @@ class BackgroundModel {
   // The most modes whose pictures take no more memory than a window of `snapshots`.
   static int most_modes(int snapshots) { return std::max(1, snapshots / 8); }
 
-  // L(t) is a number at every pixel and any t: nothing that it was made of is infinite or not one.
+  // True if L(t) is a number at every pixel and any t: all numbers that make it up are finite.
   bool is_finite() const;
 
   // True while the snapshots are still read.
@@ -83,7 +83,7 @@ class BackgroundModel {
   // Where it throws, all is as it was.
   void make_room(size_t pixels, bool limits);
 
-  // Of one that is frozen: pixels first .. first + count - 1 are these, in unit light.
+  // Only while frozen: sets pixels first .. first + count - 1 of L to these levels, in unit light.
   void replace(size_t first, size_t count, const uint8_t* const level[3]);
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.

@@ -14,24 +14,26 @@ namespace qdmd {
 // from one thread.
 class SideThread {
  public:
-  // `active` false, or a system that gives no more threads: start() runs its function itself.
+  // If `active` is false, or the system gives no more threads, start() runs its function itself.
   explicit SideThread(bool active);
   SideThread(const SideThread&) = delete;
   SideThread& operator=(const SideThread&) = delete;
-  // Waits for the function that runs, whose exception is lost.
+  // Waits for the function that runs; its exception is lost.
   ~SideThread();
 
   // As `active` of the constructor, from the next start() on. While nothing runs.
   void set_active(bool active);
-  // Runs `work`; the one before must have been finished. True: it is done, there was no thread.
+  // Begins to run `work`; call finish() or abandon() for the work before. True: `work` is already
+  // done, because there is no thread.
   bool start(std::function<void()> work);
-  // Waits until what start() began is done (nothing: returns at once) and throws what it threw.
+  // Waits until the work that start() began is done (at once if there is none), and throws on its
+  // exception.
   void finish();
-  // The same, and forgets what it threw: nobody waits for the result.
+  // The same, but forgets the exception: nobody wants the result.
   void abandon() noexcept;
-  // The same, and keeps what it threw for finish().
+  // The same, but keeps the exception for finish().
   void rest() noexcept { wait(); }
-  // Waits until what start() began is done, or until then.
+  // Waits until the work that start() began is done, or until the time `then`.
   void wait_until(std::chrono::steady_clock::time_point then);
   // True where nothing runs.
   bool idle();

@@ -6,8 +6,8 @@
 
 namespace qdmd {
 
-// A pool for passes over pixels and, unless it is to be one thread, one for what goes on beside the
-// caller.
+// A pool for passes over pixels and, unless there is to be one thread only, a thread for the work
+// that goes on beside the caller.
 class Workers {
  public:
   static constexpr int kMost = 256;
@@ -15,14 +15,15 @@ class Workers {
   // The threads that Workers(threads) asks the system for.
   static int count(int threads);
 
-  // `threads` <= kMost; 0: one for each core, and what goes on beside the caller has its own even
-  // on one core. Fewer where the system starts no more.
+  // `threads` <= kMost; 0: one for each core, and even on one core a thread for the work beside the
+  // caller. There are fewer if the system starts no more.
   explicit Workers(int threads);
 
   Pool& pool() { return pool_; }
   SideThread& side() { return side_; }
 
-  // Another number, from the next follow() on that finds nothing under way.
+  // Asks for another number of threads. It holds from the next follow() on that finds no work under
+  // way.
   void ask_for(int threads) { asked_ = threads; }
   // While no pass runs.
   void follow();
