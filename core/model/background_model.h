@@ -36,7 +36,7 @@ class BackgroundModel {
   // L(t) by kSteadyLevels: L need not be made anew for each of them. Until begin().
   void make_steady() { steady_ = true; }
   static constexpr int kSteadyFrames = 10;
-  static constexpr double kSteadyLevels = 0.125;
+  static constexpr double kSteadyLevels = 0.25;
   // One gain for each frame from the first snapshot on. L(t) is multiplied by the gain of time t,
   // or of the nearest time that has one. Kept until begin().
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
