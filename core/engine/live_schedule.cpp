@@ -92,7 +92,8 @@ void LiveSchedule::publish() {
 void LiveSchedule::begin_work() {
   LivePlan::Step step = plan_.next();
   const bool first = !background().known();
-  if (step.solve) step.solve = pace().next_stretch(&background()) || first;
+  if (step.solve)
+    step.solve = pace().next_stretch(&background(), background().learner().enough()) || first;
   const bool at_once = plan_.at_once() || first;
   // Frames that are kept for a solve in progress are no part of the window.
   const int size =

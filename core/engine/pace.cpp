@@ -18,7 +18,7 @@ void Pace::restart() {
   budget_.solve_next();
 }
 
-bool Pace::next_stretch(Background* background) {
+bool Pace::next_stretch(Background* background, int enough) {
   const Clock::Spent now = clock_->spent(), spent = now.since(start_);
   SolveCost cost;
   if (solves_)
@@ -26,7 +26,7 @@ bool Pace::next_stretch(Background* background) {
   budget_.add(frames_, spent.all(), cost);
   start_ = now;
   frames_ = 0;
-  solves_ = budget_.next();
+  solves_ = budget_.next(enough);
   if (solves_) background->learner().set_sample_step(budget_.effort().sample_step);
   return solves_;
 }

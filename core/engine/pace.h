@@ -24,7 +24,8 @@ class Pace {
 
   void count_frame() { ++frames_; }
   // The stretch before is over. True: the next one is solved; `background` was told how.
-  bool next_stretch(Background* background);
+  // enough: one of so many stretches has to be solved.
+  bool next_stretch(Background* background, int enough = 1);
   // The next stretch is solved, whatever is owed: it begins a new scene, or nobody knows it.
   void solve_next() { budget_.solve_next(); }
 

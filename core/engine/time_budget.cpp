@@ -90,10 +90,10 @@ void TimeBudget::set(double seconds_per_frame) {
   choose();
 }
 
-bool TimeBudget::next() {
-  const bool due =
-      since_solve_ == 0 || since_solve_ >= kMostPeriod ||
-      (since_solve_ >= effort().period && (!limited() || debt_ <= kLoan * budget_ * frames_));
+bool TimeBudget::next(int enough) {
+  const bool due = since_solve_ == 0 || since_solve_ >= kMostPeriod ||
+                   (since_solve_ >= std::max(enough, effort().period) &&
+                    (!limited() || debt_ <= kLoan * budget_ * frames_));
   if (due) since_solve_ = 0;
   ++since_solve_;
   given_ = effort();

@@ -68,8 +68,8 @@ class TimeBudget {
   void set(double seconds_per_frame);
   bool limited() const { return budget_ > 0; }
 
-  // Called once before each stretch: is it solved?
-  bool next();
+  // Called once before each stretch: is it solved? enough: one of so many stretches has to be.
+  bool next(int enough = 1);
   // The next stretch is solved, whatever is owed: it begins a new scene, or nobody knows it.
   void solve_next() { since_solve_ = 0; }
   // The seconds that this stretch took in all, and the part of its solve, if it was solved. A

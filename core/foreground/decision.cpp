@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "core/foreground/mask_runs.h"
 #include "core/foreground/vote.h"
@@ -162,6 +163,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
+  now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
   // Fewer parts than rows, so that each has some.
   const Grid& grid = texture_.grid();
   const int parts = static_cast<int>(
@@ -243,13 +245,13 @@ void Decision::compare(int first_row, int row_count) {
       const size_t count = std::min(kMaxRun, width - left), first = shape_.first(y) + left;
       uint8_t* const level[3] = {level_row(0, y) + left, level_row(1, y) + left,
                                  level_row(2, y) + left};
-      now_.frame.model->evaluate(first, count, level);
+      if (!now_.level_known) now_.frame.model->evaluate(first, count, level);
       const uint8_t* const x[3] = {now_.frame.x[0] + first, now_.frame.x[1] + first,
                                    now_.frame.x[2] + first};
       if (!now_.means)
         foreground_mask(x, level, count, now_.threshold, nullptr, differing_row(y) + left);
     }
-    for (int c = 0; c < kChannels; ++c) repeat_border(level_row(c, y));
+    for (int c = 0; c < kChannels && !now_.level_known; ++c) repeat_border(level_row(c, y));
     if (now_.frame.ignored) now_.frame.ignored->clear(y, 0, shape_.width, differing_row(y));
     repeat_border(differing_row(y));
   }

@@ -100,6 +100,7 @@ class Decision {
     Pool* pool = nullptr;
     bool means = false, textures = false;
     double threshold = 0;
+    bool level_known = false;  // L is still that of the frame before
   };
   // Pixels left .. left + count - 1 of a row.
   struct Run;
@@ -138,6 +139,7 @@ class Decision {
   PixelNoise noise_;
   Specks specks_;
   int64_t frames_ = 0;
+  uint64_t picture_ = 0;  // of the model: whose L there is
   Now now_;
   Pictures of_;
 };

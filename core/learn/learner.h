@@ -103,6 +103,9 @@ class Learner {
   virtual void build(Slice slice, BackgroundModel* model) = 0;
   // Of the newest model that was built whole.
   virtual SolveFacts facts() const = 0;
+  // What follows the frames as they come may leave out solves: one of so many hops is enough, as
+  // the newest solves found hardly anything new. Not while one runs.
+  virtual int enough() const { return 1; }
   // That model is now the one in use.
   virtual void publish() {}
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 namespace qdmd {
@@ -18,6 +19,9 @@ void group_by_four(const Matrix& rows, std::vector<double>* out) {
 }
 
 constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+// Of all models.
+std::atomic<uint64_t> pictures_shown{0};
 
 }  // namespace
 
@@ -44,7 +48,9 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   model_ = TemporalModel(model);
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
-  frozen_ = false;
+  largest_ = 255 * basis_.cwiseAbs().rowwise().sum();
+  frozen_ = steady_ = false;
+  change();
   stride_ = 1;
   gains_.clear();
   limits_.clear();
@@ -108,16 +114,33 @@ Gain BackgroundModel::light(double t) const {
   return gains_[static_cast<size_t>(std::clamp(std::round(t), 0.0, last))];
 }
 
+void BackgroundModel::change() { picture_ = ++pictures_shown; }
+
+void BackgroundModel::take_weights(const float* weights, size_t count) {
+  if (std::equal(weights_.begin(), weights_.end(), weights, weights + count)) return;
+  weights_.assign(weights, weights + count);
+  change();
+}
+
+void BackgroundModel::use_steady_weights(double t) {
+  const double middle = (std::floor(t / kSteadyFrames) + 0.5) * kSteadyFrames;
+  model_.weights(middle / stride_, &steady_weights_);
+  const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs() * largest_;
+  if (moved.maxCoeff() < kSteadyLevels) time_weights_ = steady_weights_;
+}
+
 void BackgroundModel::set_time(double t) {
   if (frozen_) {
-    weights_.assign(kIdentity.begin(), kIdentity.end());
+    std::array<float, 9> weights = kIdentity;
     if (!gains_.empty()) {
       const Gain gain = light(t);
-      for (size_t c = 0; c < kChannels; ++c) weights_[4 * c] = gain[c];
+      for (size_t c = 0; c < kChannels; ++c) weights[4 * c] = gain[c];
     }
+    take_weights(weights.data(), weights.size());
     return;
   }
   model_.weights(t / stride_, &time_weights_);
+  if (steady_) use_steady_weights(t);
   if (!gains_.empty()) {
     const Gain gain = light(t);
     for (size_t c = 0; c < gain.size(); ++c)
@@ -128,14 +151,12 @@ void BackgroundModel::set_time(double t) {
       direct_weights_ = Eigen::MatrixXd(kChannels, basis_.cols());
     direct_weights_.noalias() = time_weights_ * basis_;
     group_by_four(direct_weights_, &coefficients_);
+    change();
     return;
   }
-  const size_t pictures = picture_count();
-  weights_.resize(3 * pictures);
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t k = 0; k < pictures; ++k)
-      weights_[c * pictures + k] = static_cast<float>(
-          time_weights_(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(k)));
+  // In the order of weights_.
+  single_weights_ = time_weights_.transpose().cast<float>();
+  take_weights(single_weights_.data(), static_cast<size_t>(single_weights_.size()));
 }
 
 void BackgroundModel::combine_directly(size_t first, size_t count, float* const* out) const {
@@ -177,6 +198,7 @@ void BackgroundModel::freeze_at(double t) {
   frozen_ = true;
   gains_.clear();
   weights_.assign(kIdentity.begin(), kIdentity.end());
+  change();
 }
 
 void BackgroundModel::freeze_but_for_light(double t) {
@@ -188,6 +210,7 @@ void BackgroundModel::freeze_but_for_light(double t) {
 
 void BackgroundModel::replace(size_t first, size_t count, const uint8_t* const level[3]) {
   for (size_t c = 0; c < kChannels; ++c) std::copy_n(level[c], count, pictures_[c] + first);
+  change();
 }
 
 void BackgroundModel::make_room(size_t pixels, bool limits) {
@@ -214,6 +237,7 @@ void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
   weights_.assign(kIdentity.begin(), kIdentity.end());
   direct_ = false;
   frozen_ = true;
+  change();
 }
 
 }  // namespace qdmd

@@ -32,6 +32,11 @@ class BackgroundModel {
   void build_from(const uint8_t* const* planes, size_t first, size_t count);
   // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
   void set_stride(int frames) { stride_ = frames; }
+  // Frames of one block of kSteadyFrames share the weights of its middle, if this moves no pixel of
+  // L(t) by kSteadyLevels: L need not be made anew for each of them. Until begin().
+  void make_steady() { steady_ = true; }
+  static constexpr int kSteadyFrames = 10;
+  static constexpr double kSteadyLevels = 0.25;
   // One gain for each frame from the first snapshot on. L(t) is multiplied by the gain of time t,
   // or of the nearest time that has one. Kept until begin().
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
@@ -83,6 +88,8 @@ class BackgroundModel {
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);
+  // As long as this is the same, L is, at all pixels; no two models' are the same.
+  uint64_t picture() const { return picture_; }
   // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one
   // array a channel. count <= kMaxRun.
   void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
@@ -94,10 +101,18 @@ class BackgroundModel {
   void combine_directly(size_t first, size_t count, float* const* out) const;
   void combine_runs(const uint8_t* const* planes, size_t from, size_t first, size_t count);
   void make_pictures(size_t count);
+  void take_weights(const float* weights, size_t count);
+  void use_steady_weights(double t);
+  // L is another picture from now on.
+  void change();
 
   TemporalModel model_;
   Eigen::MatrixXd basis_, time_weights_, direct_weights_;
-  bool direct_ = false, frozen_ = false;
+  Eigen::MatrixXd steady_weights_;
+  Eigen::MatrixXf single_weights_;  // K x 3
+  Eigen::VectorXd largest_;         // that a picture has at a pixel, in levels: bounds
+  bool direct_ = false, frozen_ = false, steady_ = false;
+  uint64_t picture_ = 0;
   int stride_ = 1;
   size_t pixels_ = 0;
   std::vector<const uint8_t*> planes_;  // of the snapshots, in time order

@@ -1,6 +1,9 @@
 // L(t) as real pictures: the temporal model, its 8-bit evaluation, and what is foreground.
 #include "core/model/background_model.h"
 
+#include <map>
+#include <set>
+
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
 #include "core/foreground/foreground.h"
@@ -233,6 +236,81 @@ TEST(BackgroundModel, RunsDoNotDependOnTheirStart) {
     for (size_t c = 0; c < 3; ++c)
       for (size_t p = 0; p < 7; ++p) EXPECT_EQ(part[c][p], whole[c * 500 + 493 + p]);
   }
+}
+
+// L(t) of 40 frames, and how many different pictures the model says that they are.
+std::pair<std::vector<std::vector<uint8_t>>, size_t> through(const TemporalModel& temporal,
+                                                             const Window& window, bool steady) {
+  BackgroundModel model;
+  model.build(window, temporal);
+  if (steady) model.make_steady();
+  std::vector<std::vector<uint8_t>> all;
+  std::map<uint64_t, std::vector<uint8_t>> pictures;
+  for (int t = 0; t < 40; ++t) {
+    model.set_time(t);
+    all.push_back(evaluate(model, window.pixels()));
+    EXPECT_EQ(all.back(), pictures.emplace(model.picture(), all.back()).first->second)
+        << "one picture, but L is another at " << t;
+  }
+  return {all, pictures.size()};
+}
+
+TEST(BackgroundModel, SteadyOnesShareAPictureWhereNoLevelMoves) {
+  std::mt19937 rng(112);
+  // Still but for noise, and a light that falls to a half.
+  for (bool fades : {false, true}) {
+    Clip clip = noisy_clip(400, 40, 2, rng);
+    if (fades)
+      for (size_t t = 0; t < 40; ++t)
+        for (auto& level : clip.frames[t])
+          level = static_cast<uint8_t>(level * std::pow(0.5, static_cast<double>(t) / 40));
+    const Window window = to_window(clip);
+    DmdOptions options;
+    options.rank = 1;
+    options.amplitude = Amplitude::window;
+    const auto temporal = decompose(window, gram_of(window), options).background;
+    const auto [exact, many] = through(temporal, window, false);
+    const auto [steady, few] = through(temporal, window, true);
+    EXPECT_EQ(many, 40u);
+    if (fades) {
+      EXPECT_EQ(few, 40u);
+      EXPECT_EQ(steady, exact);
+      continue;
+    }
+    EXPECT_LE(few, 40u / BackgroundModel::kSteadyFrames);
+    // An eighth of a level, and rounding.
+    for (size_t t = 0; t < 40; ++t)
+      for (size_t k = 0; k < exact[t].size(); ++k)
+        EXPECT_LE(std::abs(exact[t][k] - steady[t][k]), 1) << t;
+  }
+}
+
+TEST(BackgroundModel, IsAnotherPictureAfterEachChange) {
+  std::mt19937 rng(113);
+  const Window window = to_window(noisy_clip(100, 8, 2, rng));
+  BackgroundModel model, other;
+  for (BackgroundModel* one : {&model, &other}) {
+    one->build(window, decompose(window, gram_of(window), every_mode(0)).background);
+    one->set_time(3);
+  }
+  EXPECT_NE(model.picture(), other.picture());
+  std::set<uint64_t> seen = {model.picture()};
+  const auto is_new = [&] { return seen.insert(model.picture()).second; };
+  model.set_time(3);
+  EXPECT_FALSE(is_new());
+  model.set_time(4);
+  EXPECT_TRUE(is_new());
+  model.freeze_at(4);
+  EXPECT_TRUE(is_new());
+  model.set_time(7);
+  EXPECT_FALSE(is_new()) << "it is the same for ever";
+  model.set_light({1.5, 1, 1});
+  model.set_time(7);
+  EXPECT_TRUE(is_new());
+  const uint8_t black[2] = {};
+  const uint8_t* const level[3] = {black, black, black};
+  model.replace(10, 2, level);
+  EXPECT_TRUE(is_new());
 }
 
 // ---- Foreground ----

@@ -116,7 +116,8 @@ double run(const Case& c) {
   // Live keeps what it knew of a scene while the camera shows another one.
   const bool knows_scenes = c.method == Method::robust && c.mode == Mode::live;
   const int others = knows_scenes ? std::max(12, c.window / 2) : 0;
-  stream(2 * c.window + c.window / 5 + 2, others);
+  // And long enough for a solve after it is back, where live leaves out some.
+  stream((others > 0 ? 3 : 2) * c.window + c.window / 5 + 2, others);
   // A window that is not full looks at most of its frames, beside those that are remembered.
   stream(c.window - 1, 0);
   const auto promised = static_cast<double>(engine.bytes());

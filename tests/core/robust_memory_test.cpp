@@ -229,6 +229,64 @@ TEST(RobustLive, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(run_engine(standing_man(), kWidth, kHeight, options), one);
 }
 
+// ---- Live: solves that are left out ----
+
+// Frames with which a new background came into use: hops have ten.
+std::vector<int> solved_frames(const Clip &clip) {
+  EngineOptions options = robust_of(40);
+  options.mode = Mode::live;
+  Engine engine;
+  EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  std::vector<int> frames;
+  uint64_t solves = 0;
+  for (size_t t = 0; t < clip.size(); ++t) {
+    Picture picture(kWidth, kHeight);
+    picture.fill(clip.frames[t]);
+    EXPECT_TRUE(engine.push(picture.in()).ok());
+    engine.pop(Output::background, picture.out());
+    if (engine.solves() > solves) frames.push_back(static_cast<int>(t));
+    solves = engine.solves();
+  }
+  return frames;
+}
+
+// A street, and from `comes` on somebody who stands there.
+Clip street_with(size_t comes, size_t count) {
+  Clip clip(kWidth * kHeight, count);
+  std::mt19937 rng(814);
+  std::normal_distribution<double> noise(0, 2);
+  for (size_t t = 0; t < count; ++t) {
+    clip.frames[t] = street();
+    for (size_t i = 0; i < clip.frames[t].size(); ++i) {
+      const int p = static_cast<int>(i % clip.pixels), x = p % kWidth, y = p / kWidth;
+      if (t >= comes && x >= 40 && x < 60 && y >= 15 && y < 55)
+        clip.frames[t][i] = static_cast<uint8_t>(i < clip.pixels ? 40 : 200);
+      clip.frames[t][i] =
+          static_cast<uint8_t>(std::clamp(std::lround(clip.frames[t][i] + noise(rng)), 0l, 255l));
+    }
+  }
+  return clip;
+}
+
+int count_between(const std::vector<int> &frames, int first, int end) {
+  return static_cast<int>(
+      std::count_if(frames.begin(), frames.end(), [&](int t) { return t >= first && t < end; }));
+}
+
+TEST(RobustLive, ABackgroundThatHasSettledIsSolvedOnceAWindow) {
+  const auto solved = solved_frames(street_with(400, 400));
+  EXPECT_EQ(count_between(solved, 200, 400), 5) << "one of four hops";
+}
+
+TEST(RobustLive, WhatStopsIsLookedAtInTheNextHop) {
+  // Frame 240 and on: with any hop, solves of a still street would be 40 frames apart.
+  const auto solved = solved_frames(street_with(241, 300));
+  EXPECT_EQ(count_between(solved, 161, 241), 2);
+  // Ten frames until it is a look, a hop until it is solved, and one for the solve.
+  EXPECT_GE(count_between(solved, 251, 275), 1);
+  EXPECT_GE(count_between(solved, 251, 300), 2);
+}
+
 // ---- A look of long ago ----
 
 // The place is empty in the first window; then somebody stands there for two windows.

@@ -33,6 +33,11 @@ int most_snapshots(int window_size) {
 // One frame in so many may be remembered, for so many windows.
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
 
+// A solve changed little if cells moved by less than a level in each channel on average, and
+// and no more than a twentieth of them by two. Noise and clouds stay below that; a background of
+// which parts are still hidden does not.
+constexpr float kCalmMean = 3, kCalmCell = 6, kMostMoved = 0.05f;
+
 // Of frames that are one frame apart, from one of frames that are `stride` apart.
 void divide_time(int stride, DmdSummary* summary) {
   summary->omega /= stride;
@@ -154,6 +159,7 @@ void RobustLearner::forget() {
   scene_.forget();
   other_scene_ = scene_begins_ = false;
   stream_from_ = -1;
+  calm_ = 0;
 }
 
 void RobustLearner::publish() {
@@ -181,6 +187,7 @@ void RobustLearner::begin_scene() {
   memory_.forget();
   absorbed_.forget();
   stream_from_ = -1;
+  calm_ = 0;
   scene_begins_ = true;
 }
 
@@ -217,6 +224,7 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
   // A window that is solved as a whole knows by itself what was uncovered, unless it was absorbed.
   if (frame.live || absorbed_.any()) {
     std::vector<int> uncovered = looks_.uncovered(background);
+    if (looks_.any_news()) calm_ = 0;
     if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
     mend(uncovered, frame, light, model);
   }
@@ -229,6 +237,7 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
 void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
                          BackgroundModel* model) {
   if (cells.empty()) return;
+  calm_ = 0;
   model->freeze_but_for_light(frame.t);
   replace(cells, frame.around.every(2), light, model);
 }
@@ -460,6 +469,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       divide_time(stride_, &facts_.dmd);
       model->begin(snapshots, decomposition.background, true);
       model->set_stride(stride_);
+      model->make_steady();
       combine(snapshots, model);
       take_reference(model, snapshots_->size() / 2);
     }
@@ -500,11 +510,29 @@ void RobustLearner::keep_some() {
   }
 }
 
+// What this solve found is what the one in use has.
+bool RobustLearner::is_calm() const {
+  if (snapshots_->size() < room_.window_size || start_frames_ == 0) return false;
+  double sum = 0;
+  size_t moved = 0;
+  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
+    float distance = 0;
+    for (int c = 0; c < kChannels; ++c)
+      distance +=
+          std::abs(background_cells_.plane(0, c)[cell] - background_cells_.plane(1, c)[cell]);
+    sum += static_cast<double>(distance);
+    moved += distance > kCalmCell;
+  }
+  const auto cells = static_cast<double>(grid_.cells());
+  return sum < kCalmMean * cells && static_cast<double>(moved) < kMostMoved * cells;
+}
+
 // What others ask the model, and what later windows are told.
 void RobustLearner::end(BackgroundModel* model) {
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
                background_cells_.plane(1 - published_, c));
+  calm_ = is_calm() ? calm_ + 1 : 0;
   if (parameters_.earlier_share > 0)
     earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh_);
   model->set_gains(gains_of_frames());

@@ -1,6 +1,7 @@
 // Robust Q-DMD: the background modes of a window whose foreground was taken out.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -68,6 +69,7 @@ class RobustLearner : public Learner {
   void decompose(const SnapshotRange& snapshots) override;
   void build(Slice slice, BackgroundModel* model) override;
   SolveFacts facts() const override { return facts_; }
+  int enough() const override { return 1 + std::min(calm_, kMostCalm); }
   void publish() override;
 
   void mend(const Compared& frame, BackgroundModel* model) override;
@@ -101,7 +103,11 @@ class RobustLearner : public Learner {
             BackgroundModel* model);
   void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                BackgroundModel* model);
+  bool is_calm() const;
   void end(BackgroundModel* model);
+
+  // Hops that are left out between two solves, at most.
+  static constexpr int kMostCalm = 3;
 
   LearnOptions options_;
   RobustParameters parameters_;
@@ -117,6 +123,8 @@ class RobustLearner : public Learner {
   int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
   Absorbed absorbed_, absorbed_now_;           // so far, and those that the solve knows of
   SceneWatch scene_;
+  // Solves in a row that changed little, since a cell was mended.
+  int calm_ = 0;
   // Another scene was seen; and solves know of it, but no background yet.
   bool other_scene_ = false, scene_begins_ = false;
   // Of the newest solve: its window, the share of it that no solve before had, of which every

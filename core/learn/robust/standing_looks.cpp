@@ -75,6 +75,7 @@ void StandingLooks::take_next(size_t at) {
 
 const std::vector<int>& StandingLooks::uncovered(const float* const background[3]) {
   found_.clear();
+  news_ = 0;
   if (std::min(grid_.rows, grid_.cols) < 4) return found_;
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
@@ -82,6 +83,7 @@ const std::vector<int>& StandingLooks::uncovered(const float* const background[3
   for (size_t cell = 0; cell < grid_.cells(); ++cell) {
     differs_[cell] = shows(cell) && differs_at(look, background, cell);
     count += differs_[cell];
+    news_ += differs_[cell] && number_ - cells_[cell].look.since < kNewsFrames;
   }
   if (count < kLeastRegion) return found_;
   CellRegions regions(grid_);

@@ -33,6 +33,11 @@ class StandingLooks {
   // What was uncovered: cells whose look has lasted for kSteady frames and is not the background's,
   // in regions where the background has the stronger contour.
   const std::vector<int>& uncovered(const float* const background[3]);
+  // True where uncovered() saw enough cells whose look is not the background's and has come within
+  // the last kNewsFrames frames, be it uncovered or something that stops.
+  bool any_news() const { return news_ >= kLeastNews; }
+  static constexpr int kNewsFrames = 25;
+  static constexpr size_t kLeastNews = 3 * kLeastRegion;
   // What has stood for `frames` frames: regions of cells whose look is not the background's, half
   // of which came so long ago, with the cells next to them.
   const std::vector<int>& stood(const float* const background[3], int64_t frames);
@@ -57,6 +62,7 @@ class StandingLooks {
   int64_t number_ = 0;
   std::vector<uint8_t> differs_;
   std::vector<int> found_;
+  size_t news_ = 0;
 };
 
 }  // namespace qdmd
