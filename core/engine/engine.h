@@ -26,9 +26,12 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  // Starts afresh with frames of width x height pixels. Where it refuses, all is as it was.
+  // Starts afresh with frames of width x height pixels; where a team shares them, push() then takes
+  // the rows of band() that are kept, and so do the pictures that are written: its own rows of them.
+  // Where it refuses, all is as it was.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
+  const Band& band() const { return frames_.band(); }
   // Gives all memory and threads back; configure() comes next.
   void close();
 
@@ -71,6 +74,9 @@ class Engine {
   Status drain();
   // Drops all frames and forgets the window and the model.
   void flush();
+  // No frame waits: windows to come know nothing of those before, but if one of them ends early, it
+  // has their frames. Batch only.
+  void begin_anew();
 
   // Frames that are pushed before a frame leaves: EngineLayout::delay.
   int delay() const { return layout_.delay; }

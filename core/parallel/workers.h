@@ -16,8 +16,9 @@ class Workers {
   static int count(int threads);
 
   // `threads` <= kMost; 0: one for each core, and what goes on beside the caller has its own even
-  // on one core. Fewer where the system starts no more.
-  explicit Workers(int threads);
+  // on one core. Fewer where the system starts no more. beside: false where nothing may go on beside
+  // the caller, whatever the number.
+  explicit Workers(int threads, bool beside = true);
 
   Pool& pool() { return pool_; }
   SideThread& side() { return side_; }
@@ -28,9 +29,10 @@ class Workers {
   void follow();
 
  private:
-  static bool may_work_beside(int threads);
+  bool may_work_beside(int threads) const;
 
   int threads_, asked_;
+  bool beside_;
   Pool pool_;
   // The last member: it ends before the pool, which it may use.
   SideThread side_;
