@@ -83,8 +83,8 @@ class Ladder {
     if (asked.spectrum) {
       const bool fast = modes.summary.solver == Solver::gram;
       modes.summary.spectrum = std::make_shared<const std::vector<SpectrumMode>>(
-          spectrum_of(fast ? factorize_gram(gram_) : factorize_gram_extended(gram_), asked,
-                      pixels_, modes.summary.background_modes));
+          spectrum_of(fast ? factorize_gram(gram_) : factorize_gram_extended(gram_), asked, pixels_,
+                      modes.summary.background_modes));
     }
     return modes;
   }
@@ -135,8 +135,7 @@ class Ladder {
   }
 
   void set_bounds(const SnapshotFactor<double>& factor, BackgroundModes* modes) const {
-    const SolvedWindow solved{gram_, pixels_, options_, factor,
-                              *modes};
+    const SolvedWindow solved{gram_, pixels_, options_, factor, *modes};
     modes->summary.rounding_bound = rounding_bound(solved);
     modes->summary.sensitivity = sensitivity(solved);
   }
@@ -182,9 +181,7 @@ class Ladder {
     if (const auto careful = extended()) {
       modes.summary.rounding_bound =
           careful->summary.rounding_bound +
-          background_distance(pivoted_factor(), pixels_, modes,
-                              *careful)
-              .largest;
+          background_distance(pivoted_factor(), pixels_, modes, *careful).largest;
       modes.summary.sensitivity = careful->summary.sensitivity;
     }
     return modes;

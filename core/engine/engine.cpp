@@ -328,8 +328,7 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     }
     if (masked && options_.mask_softness > 0) soften(levels, &task);
     return_to_frame(&task, output == Output::background || output == Output::foreground);
-    const int top = band().own_begin(), height = band().own_rows(),
-              together = rows_together(out);
+    const int top = band().own_begin(), height = band().own_rows(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
     const auto write = [&](int first, int count, size_t) {
       const int row = first * together;

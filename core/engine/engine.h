@@ -27,8 +27,8 @@ class Engine {
   Engine& operator=(const Engine&) = delete;
 
   // Starts afresh with frames of width x height pixels; where a team shares them, push() then takes
-  // the rows of band() that are kept, and so do the pictures that are written: its own rows of them.
-  // Where it refuses, all is as it was.
+  // the rows of band() that are kept, and so do the pictures that are written: its own rows of
+  // them. Where it refuses, all is as it was.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
   const Band& band() const { return frames_.band(); }

@@ -158,11 +158,10 @@ Status check_options(const EngineOptions& options, int width, int height) {
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
   if (Status status = check_team(options, width, height); !status.ok()) return status;
   const EngineLayout layout = layout_of(options, width, height);
-  const uint64_t solver =
-      layout.bytes == UINT64_MAX
-          ? 0
-          : Learner::make(options, width, band_of(options, width, height))
-                ->solver_bytes(options.window_size);
+  const uint64_t solver = layout.bytes == UINT64_MAX
+                              ? 0
+                              : Learner::make(options, width, band_of(options, width, height))
+                                    ->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
             "solver=adjoint with a window-size of " + describe(options, width, height) +

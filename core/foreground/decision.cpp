@@ -255,12 +255,11 @@ void Decision::share_mask() {
     bits[p / 8] = static_cast<uint8_t>(bits[p / 8] | (own[p] & 1) << p % 8);
   band_.team()->share(Talk::masks, std::as_writable_bytes(std::span(packed_)), ends);
   for (int r = 0; r < band_.members(); ++r) {
-    const uint8_t* const from = packed_.data() + ends[static_cast<size_t>(r)] -
-                                packed_size(band_, r, shape_.width);
+    const uint8_t* const from =
+        packed_.data() + ends[static_cast<size_t>(r)] - packed_size(band_, r, shape_.width);
     uint8_t* const to = whole_.data() + static_cast<size_t>(band_.begin_of(r)) * width;
     const size_t pixels = static_cast<size_t>(band_.end_of(r) - band_.begin_of(r)) * width;
-    for (size_t p = 0; p < pixels; ++p)
-      to[p] = static_cast<uint8_t>(-(from[p / 8] >> p % 8 & 1));
+    for (size_t p = 0; p < pixels; ++p) to[p] = static_cast<uint8_t>(-(from[p / 8] >> p % 8 & 1));
   }
 }
 
@@ -339,8 +338,7 @@ void Decision::compare_means(int first_row, int row_count) {
       for (int p = 0; p < run.count; ++p)
         row[left + p] = run.own[p] > most && run.nearest[p] > alone ? 255 : 0;
     }
-    if (now_.frame.ignored)
-      now_.frame.ignored->clear(band_.first() + y, 0, shape_.width, row);
+    if (now_.frame.ignored) now_.frame.ignored->clear(band_.first() + y, 0, shape_.width, row);
     repeat_border(row);
   }
 }
@@ -436,9 +434,10 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
       std::copy_n(noise + p, size, known);
       learn_distance(run.nearest + p, size, texture_.share(cell), noise + p);
       if (now_.frame.ignored)
-        now_.frame.ignored->visit(band_.first() + y, left + p, end - p, [&](int64_t first, int64_t last) {
-          std::copy(known + first, known + last, noise + p + first);
-        });
+        now_.frame.ignored->visit(band_.first() + y, left + p, end - p,
+                                  [&](int64_t first, int64_t last) {
+                                    std::copy(known + first, known + last, noise + p + first);
+                                  });
     } else if (moving) {
       raise_limit(noise + p, factor, size, run.limit + p);
       keep_beyond(run.own + p, run.limit + p, size, foreground + p);
@@ -536,10 +535,11 @@ void Decision::learn(int first_row, int row_count) {
         for (int p = begin; p < end; ++p) wide[p] = 255, now[p] = 0;
       }
       if (now_.frame.ignored)
-        now_.frame.ignored->visit(band_.first() + y, left, run.count, [&](int64_t begin, int64_t end) {
-          std::fill(wide + begin, wide + end, uint8_t{255});
-          std::fill(now + begin, now + end, uint8_t{0});
-        });
+        now_.frame.ignored->visit(band_.first() + y, left, run.count,
+                                  [&](int64_t begin, int64_t end) {
+                                    std::fill(wide + begin, wide + end, uint8_t{255});
+                                    std::fill(now + begin, now + end, uint8_t{0});
+                                  });
       noise_.learn(y, static_cast<size_t>(left), static_cast<size_t>(run.count), run.own, run.limit,
                    wide, now);
     }

@@ -120,8 +120,8 @@ class Decision {
   void in_bands(int length, int bands, Band band);
   void clear_marks();
   void share_mask();
-  // Of the rows that are kept: where those of a row of cells begin, and that row of the mask, of the
-  // picture's if there is none.
+  // Of the rows that are kept: where those of a row of cells begin, and that row of the mask, of
+  // the picture's if there is none.
   int top(int grid_row) const {
     return std::clamp(texture_.grid().top(grid_row) - band_.first(), 0, band_.rows());
   }

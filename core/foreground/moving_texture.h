@@ -29,8 +29,8 @@ class MovingTexture {
     int count;
   };
 
-  // Takes all memory. For pictures of that width and a band of their rows; rows count in the picture.
-  // Members share what they find in their own ones.
+  // Takes all memory. For pictures of that width and a band of their rows; rows count in the
+  // picture. Members share what they find in their own ones.
   MovingTexture(int width, const Band& band, const DecisionConstants& constants = {});
   static uint64_t bytes(int width, int height, const DecisionConstants& constants = {});
 
@@ -47,7 +47,8 @@ class MovingTexture {
   const uint8_t* before(int channel, int y) const { return before_.data() + offset(channel, y); }
   // threshold: levels above which pixels differ. Threads have cells of their own.
   void add(size_t cell, const Sample& sample, double threshold);
-  // After the last cell of a frame whose planes, the rows that are kept, are x. last: the next cells are of another frame.
+  // After the last cell of a frame whose planes, the rows that are kept, are x. last: the next
+  // cells are of another frame.
   void end_frame(const uint8_t* const x[3], bool last = true);
   // Frames that ended.
   int64_t frames() const { return frames_; }

@@ -75,8 +75,7 @@ double GramLearner::solve_seconds(int window_size) const {
 
 uint64_t GramLearner::solver_bytes(int window_size) const {
   if (options_.method == Method::dmd || options_.dmd.solver != Solver::adjoint) return 0;
-  return static_cast<uint64_t>(
-      adjoint_bytes(pixels_seen(), window_size));
+  return static_cast<uint64_t>(adjoint_bytes(pixels_seen(), window_size));
 }
 
 // By the decomposition, those of other members included.
@@ -119,8 +118,7 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
   // Other members answer for the rows around.
   const auto row = static_cast<size_t>(width_);
   const size_t before = step_ > 1 ? 0 : static_cast<size_t>(band_.own_begin()) * row;
-  const size_t own =
-      step_ > 1 ? columns.pixels() : static_cast<size_t>(band_.own_rows()) * row;
+  const size_t own = step_ > 1 ? columns.pixels() : static_cast<size_t>(band_.own_rows()) * row;
   gram_.add_slice(columns, frames, before + slice.first(own, kUnit), slice.size(own, kUnit),
                   slice.index == 0);
 }

@@ -12,8 +12,8 @@
 #include "core/learn/method.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
-#include "core/parallel/pool.h"
 #include "core/parallel/band.h"
+#include "core/parallel/pool.h"
 #include "core/passes/bands.h"
 
 namespace qdmd {

@@ -31,8 +31,8 @@ class Team {
 
   // Each value becomes the sum of all members'.
   virtual void sum(Talk about, std::span<int64_t> values) = 0;
-  // Member r has written bytes ends[r - 1] (0: the first) .. ends[r] - 1 of `all`; afterwards it has
-  // all of them.
+  // Member r has written bytes ends[r - 1] (0: the first) .. ends[r] - 1 of `all`; afterwards it
+  // has all of them.
   virtual void share(Talk about, std::span<std::byte> all, std::span<const size_t> ends) = 0;
 };
 

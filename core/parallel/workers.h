@@ -16,8 +16,8 @@ class Workers {
   static int count(int threads);
 
   // `threads` <= kMost; 0: one for each core, and what goes on beside the caller has its own even
-  // on one core. Fewer where the system starts no more. beside: false where nothing may go on beside
-  // the caller, whatever the number.
+  // on one core. Fewer where the system starts no more. beside: false where nothing may go on
+  // beside the caller, whatever the number.
   explicit Workers(int threads, bool beside = true);
 
   Pool& pool() { return pool_; }

@@ -71,8 +71,9 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const uint8_t* 
     for (int first = 0; first < grid.width; first += kColumns) {
       const int count = std::min(kColumns, grid.width - first);
       HWY_DYNAMIC_DISPATCH(sum_columns)
-      (plane + static_cast<ptrdiff_t>(top - plane_top) * grid.width + first, static_cast<size_t>(grid.width),
-       static_cast<size_t>(height), static_cast<size_t>(count), sums);
+      (plane + static_cast<ptrdiff_t>(top - plane_top) * grid.width + first,
+       static_cast<size_t>(grid.width), static_cast<size_t>(height), static_cast<size_t>(count),
+       sums);
       // A cell may end in these columns or go on in the next.
       for (int x = 0; x < count;) {
         const int end = std::min(count, *next - first);
@@ -109,9 +110,8 @@ void find_cells(const Grid& grid, const Band& band, const uint8_t* const planes[
     ends.push_back(sizeof(float) * static_cast<size_t>(row_at(grid, band.end_of(rank))) *
                    static_cast<size_t>(grid.cols));
   for (int c = 0; c < kChannels; ++c)
-    band.team()->share(Talk::cells,
-                       std::as_writable_bytes(std::span(cells->plane(frame, c), grid.cells())),
-                       ends);
+    band.team()->share(
+        Talk::cells, std::as_writable_bytes(std::span(cells->plane(frame, c), grid.cells())), ends);
 }
 
 }  // namespace qdmd
