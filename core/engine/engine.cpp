@@ -345,6 +345,16 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
   });
 }
 
+const uint8_t* Engine::whole_mask() {
+  if (!ready()) return nullptr;
+  const Clock::Span span(clock_, Clock::frames);
+  return flushed_if_it_throws([&] {
+    OutputTask task = next_task(Output::mask);
+    decide_next(&task);
+    return background_->decision().whole_mask();
+  });
+}
+
 void Engine::skip() {
   if (!ready()) return;
   if (soft_mask_ && !softened_) soft_mask_->forget();

@@ -46,6 +46,10 @@ class Engine {
   // computed of it. Call only while ready(); `out` has the configured size. Its black, white and
   // neutral chroma are `levels`: the configured ones, or, of a mask in another format, its own.
   void write(Output output, const Levels& levels, const MutableImageView& out);
+  // The mask of the frame that leaves next, of the whole picture, whoever shares it: 255 where
+  // foreground, else 0, width * height samples in row order. Good until skip(). Null unless
+  // ready().
+  const uint8_t* whole_mask();
   // The next frame has left. Call only while ready().
   void skip();
   // write() in the configured levels, and skip().

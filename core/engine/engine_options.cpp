@@ -119,6 +119,10 @@ Status check_team(const EngineOptions& options, int width, int height) {
       options.mask_softness > 0)
     return {Code::invalid_options,
             "processes share a window in mode=batch with stabilize=off and mask-softness=0 only"};
+  // What an earlier window's background was is not known as far outwards as its frames are.
+  if (options.method == Method::robust && options.remembers)
+    return {Code::invalid_options,
+            "processes that share a window forget it before the next: remembers=false"};
   if (options.method != Method::dmd &&
       (options.dmd.solver == Solver::qr || options.dmd.solver == Solver::adjoint))
     return {Code::invalid_options,

@@ -67,6 +67,8 @@ class Decision {
   void decide(const Comparison& frame, Pool* pool);
   // 255 where foreground, else 0; samples in row order.
   const uint8_t* mask() const { return of_.mask.data(); }
+  // The same of the whole picture.
+  const uint8_t* whole_mask() const { return band_.is_whole() ? mask() : whole_.data(); }
   // The same where shadows are marked: 255 where light alone differs.
   const uint8_t* shaded() const {
     return shadows_ == Shadows::marked ? of_.shaded.data() : nullptr;

@@ -54,6 +54,7 @@ struct Street {
 // What a run gives: for each frame the pictures, own rows only; and of each solve what it says.
 struct Results {
   std::vector<std::vector<uint8_t>> pictures;
+  std::vector<std::vector<uint8_t>> masks;  // of whole pictures
   std::vector<double> said;
   std::vector<uint8_t> background;
   bool operator==(const Results&) const = default;
@@ -112,6 +113,8 @@ Results run(const Case& c, Team* team) {
         engine.write(output, {}, out.out());
         results.pictures.push_back(rows_of(out, band.own_begin(), band.own_rows()));
       }
+      const uint8_t* const mask = engine.whole_mask();
+      results.masks.emplace_back(mask, mask + c.street.width * c.street.height);
       engine.skip();
       if (engine.solves() == solves) continue;
       solves = engine.solves();
@@ -148,6 +151,7 @@ Results run_shared(const Case& c, int size) {
   Results whole = parts.front();
   for (size_t r = 1; r < parts.size(); ++r) {
     EXPECT_EQ(parts[r].said, whole.said);
+    EXPECT_TRUE(parts[r].masks == whole.masks) << "member " << r;
     if (parts[r].pictures.size() != whole.pictures.size()) {
       ADD_FAILURE() << "member " << r << " has other pictures";
       continue;
@@ -167,6 +171,7 @@ void expect_shared_as_whole(const Case& c, std::initializer_list<int> sizes) {
   for (int size : sizes) {
     const Results shared = run_shared(c, size);
     EXPECT_EQ(shared.said, alone.said) << c.name << ", " << size << " members";
+    EXPECT_TRUE(shared.masks == alone.masks) << c.name << ", " << size << " members";
     EXPECT_EQ(shared.background, alone.background) << c.name << ", " << size << " members";
     ASSERT_EQ(shared.pictures.size(), alone.pictures.size());
     for (size_t i = 0; i < alone.pictures.size(); ++i) {
@@ -186,6 +191,7 @@ EngineOptions options_of(Method method, int window) {
   options.method = method;
   options.window_size = window;
   options.threads = 1;
+  options.remembers = false;
   return options;
 }
 
@@ -238,8 +244,7 @@ TEST(Band, RobustInNoiseAndWithWhatStays) {
 }
 
 TEST(Band, WindowsByThemselves) {
-  EngineOptions options = options_of(Method::robust, 16);
-  options.remembers = false;
+  const EngineOptions options = options_of(Method::robust, 16);
   expect_shared_as_whole({"anew", {127, 123}, options, 41, 0, true}, {2, 3});
 }
 
@@ -297,6 +302,10 @@ TEST(Band, RefusesWhatNeedsTheWholePicture) {
     options.mode = Mode::live;
     EXPECT_FALSE(engine.configure(options, 64, 64).ok());
     options.mode = Mode::batch;
+    options.method = Method::robust;
+    options.remembers = true;
+    EXPECT_FALSE(engine.configure(options, 64, 64).ok());
+    options.method = Method::qdmd;
     EXPECT_FALSE(engine.configure(options, 64, 1).ok()) << "there are more members than rows";
     EXPECT_TRUE(engine.configure(options, 64, 2).ok());
   });
