@@ -57,14 +57,7 @@ class Job {
     engine_options_.team = team;
     engine_options_.remembers = false;
     done_.settings = settings_of(options);
-    if (!options.resume) return;
-    const auto before = read_progress(progress_path_);
-    if (!before) return;
-    if (before->settings != done_.settings)
-      throw std::invalid_argument(progress_path_ +
-                                  " is of a job with other options: give the same ones, or leave "
-                                  "--resume out to begin anew");
-    done_ = *before;
+    if (options.resume) go_on();
   }
 
   void run() {
@@ -80,6 +73,24 @@ class Job {
   using Clock = std::chrono::steady_clock;
   static double since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
+  // Where an earlier job stopped. The first process has its files.
+  void go_on() {
+    if (writes()) {
+      const auto before = read_progress(progress_path_);
+      if (before && before->settings != done_.settings)
+        throw std::runtime_error(progress_path_ +
+                                 " is of a job with other options: give the same ones, or leave "
+                                 "--resume out to begin anew");
+      if (before) done_ = *before;
+    }
+    if (!team_) return;
+    int64_t values[] = {done_.windows, done_.frames, done_.ended};
+    team_->tell(values);
+    done_.windows = values[0];
+    done_.frames = values[1];
+    done_.ended = values[2] != 0;
   }
 
   bool writes() const { return !team_ || team_->rank() == 0; }
@@ -136,7 +147,6 @@ class Job {
       if (++read <= first) continue;
       if (!engine_.configured()) {
         configure();
-        frames_before_ = first;
         line_.begin(reader_.share());
       }
       const auto start = Clock::now();
@@ -328,7 +338,7 @@ class Job {
   std::optional<Outputs> outputs_;
   std::string progress_path_;
   Progress done_;
-  int64_t frames_ = 0, frames_before_ = 0;
+  int64_t frames_ = 0;
   std::vector<uint8_t> kept_, whole_;
   std::vector<size_t> ends_;
   Json solves_ = Json::array();

@@ -164,9 +164,15 @@ int main(int argc, char** argv) {
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-      if (team && team->rank() > 0) return error.get_exit_code() == 0 ? 0 : 2;
-      return app.exit(error) == 0 ? 0 : 2;
+      // What only some find is no matter of options.
+      const bool alike = !team || team->agree(true) == 2;
+      if (alike && team && team->rank() > 0) return error.get_exit_code() == 0 ? 0 : 2;
+      const int status = app.exit(error) == 0 ? 0 : 2;
+      if (!alike) MpiTeam::abort();
+      return status;
     }
+    // Somebody is about to end the job.
+    if (team && team->agree(false) != 0) team->wait_for_all();
     options.wanted = wanted_of(paths);
     run_job(options, team.get());
     return 0;

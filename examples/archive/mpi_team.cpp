@@ -85,16 +85,26 @@ void MpiTeam::share(Talk about, std::span<std::byte> all, std::span<const size_t
                  MPI_COMM_WORLD);
 }
 
-bool MpiTeam::all_have(bool one) {
+int MpiTeam::agree(bool one) {
   const Call call(this, Traffic::pace, sizeof(int));
   int count = one ? 1 : 0;
   MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  if (count != 0 && count != size_)
+  return count == 0 ? 0 : count == size_ ? 2 : 1;
+}
+
+bool MpiTeam::all_have(bool one) {
+  const int have = agree(one);
+  if (have == 1)
     throw std::runtime_error(one ? "another process has come to the end of the recording already: "
                                    "do all machines have the same files?"
                                  : "the recording ends here, and other processes have more of it: "
                                    "do all machines have the same files?");
-  return count == size_;
+  return have == 2;
+}
+
+void MpiTeam::tell(std::span<int64_t> values) {
+  const Call call(this, Traffic::pace, rank_ == 0 ? 0 : values.size_bytes());
+  MPI_Bcast(values.data(), static_cast<int>(values.size()), MPI_INT64_T, 0, MPI_COMM_WORLD);
 }
 
 void MpiTeam::gather(std::span<const uint8_t> own, std::span<uint8_t> all,

@@ -33,9 +33,13 @@ class MpiTeam : public Team {
   void sum(Talk about, std::span<int64_t> values) override;
   void share(Talk about, std::span<std::byte> all, std::span<const size_t> ends) override;
 
+  // Whether all members found something alike: 0 none, 1 some, 2 all.
+  int agree(bool one);
   // Whether all members have a frame; throws std::runtime_error where only some do: they do not
   // read the same.
   bool all_have(bool one);
+  // The first member's values at all.
+  void tell(std::span<int64_t> values);
   // The first member gets all parts one after another, member r's up to ends[r], into `all`; that
   // of the others may be empty.
   void gather(std::span<const uint8_t> own, std::span<uint8_t> all, std::span<const size_t> ends);

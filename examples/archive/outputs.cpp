@@ -1,5 +1,6 @@
 #include "examples/archive/outputs.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -51,9 +52,6 @@ void check_wanted(const std::vector<Wanted>& wanted) {
     if (!one.is_picture() && path.extension() != ".mkv")
       throw std::invalid_argument(one.path +
                                   " ends in neither .mkv (a video) nor .png (a picture)");
-    const fs::path folder = fs::absolute(path).parent_path();
-    if (!fs::is_directory(folder))
-      throw std::invalid_argument(folder.string() + " is no folder: make it first");
     for (const Wanted& other : wanted)
       if (&other != &one && fs::absolute(other.path) == fs::absolute(path))
         throw std::invalid_argument(one.path + " is named twice");
@@ -80,6 +78,9 @@ VideoShape Outputs::shape_of(size_t which) const {
 
 void Outputs::begin_after(int64_t windows) {
   for (size_t which = 0; which < wanted_.size(); ++which) {
+    const fs::path beside = fs::absolute(wanted_[which].path).parent_path();
+    if (!fs::is_directory(beside))
+      throw std::runtime_error(beside.string() + " is no folder: make it first");
     if (wanted_[which].is_picture()) {
       fs::remove(temporary_of(picture_of(wanted_[which].path, windows)));
       continue;
