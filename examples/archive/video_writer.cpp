@@ -45,8 +45,12 @@ const char* const kPicture = "pngenc snapshot=true";
 VideoWriter::VideoWriter(const std::string& path, const VideoShape& shape,
                          const std::string& encoder)
     : path_(path), shape_(shape) {
-  pipeline_ = make_pipeline(std::string(kSource) + "videoconvert ! " + encoder +
-                            " ! filesink name=sink async=false");
+  // Of all that the lossless encoder takes, what loses nothing of this.
+  const std::string kept =
+      shape.grey ? "video/x-raw,format=GRAY8 ! " : "video/x-raw,format=BGRx ! ";
+  pipeline_ =
+      make_pipeline(std::string(kSource) + "videoconvert ! " + (encoder == kLossless ? kept : "") +
+                    encoder + " ! filesink name=sink async=false");
   source_ = element_of(pipeline_, "source");
   g_object_set(element_of(pipeline_, "sink").get(), "location", path.c_str(), nullptr);
   GstVideoInfo info;
