@@ -29,7 +29,7 @@ LONG = bool(os.environ.get('QDMD_ARCHIVE_LONG'))
 # One machine only: no launcher and no network.
 JOB = ['--oversubscribe', '--allow-run-as-root', '--bind-to', 'none', '--mca', 'plm', 'isolated',
        '--mca', 'btl', 'self,vader', '--mca', 'oob_tcp_if_include', 'lo', '--mca',
-       'btl_vader_single_copy_mechanism', 'none']
+       'btl_vader_single_copy_mechanism', 'none', '--mca', 'mpi_yield_when_idle', '1']
 WIDTH, HEIGHT, FRAMES, WINDOW = 161, 123, 50, 20
 LONG_FRAMES = 97
 
