@@ -223,7 +223,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   uint8_t* const mask = band_.is_whole() ? of_.mask.data() : whole_.data();
   if (steps_.specks && shape_.reach > 0) {
     const auto area = [&](double share) {
-      return static_cast<size_t>(share * static_cast<double>(shape_.width) * band_.height());
+      const double pixels = static_cast<double>(shape_.width) * band_.height();
+      return static_cast<size_t>(share * pixels);
     };
     specks_.take_out(mask, 255, area(constants().least_foreground), true);
     specks_.take_out(mask, 0, area(constants().least_hole), false);
@@ -250,16 +251,14 @@ void Decision::share_mask() {
   uint8_t* const bits = packed_.data() + (rank > 0 ? ends[rank - 1] : 0);
   const uint8_t* const own = of_.mask.data() + shape_.first(band_.own_begin());
   const size_t count = static_cast<size_t>(band_.own_rows()) * width;
-  std::fill(bits, packed_.data() + ends[rank], uint8_t{0});
-  for (size_t p = 0; p < count; ++p)
-    bits[p / 8] = static_cast<uint8_t>(bits[p / 8] | (own[p] & 1) << p % 8);
+  pack_mask(own, count, bits);
   band_.team()->share(Talk::masks, std::as_writable_bytes(std::span(packed_)), ends);
   for (int r = 0; r < band_.members(); ++r) {
     const uint8_t* const from =
         packed_.data() + ends[static_cast<size_t>(r)] - packed_size(band_, r, shape_.width);
     uint8_t* const to = whole_.data() + static_cast<size_t>(band_.begin_of(r)) * width;
     const size_t pixels = static_cast<size_t>(band_.end_of(r) - band_.begin_of(r)) * width;
-    for (size_t p = 0; p < pixels; ++p) to[p] = static_cast<uint8_t>(-(from[p / 8] >> p % 8 & 1));
+    unpack_mask(from, pixels, to);
   }
 }
 
