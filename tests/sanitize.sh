@@ -38,7 +38,7 @@ long() {
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
-    thread) names=(pool side_thread gram_slices live_schedule absorb another_scene) ;;
+    thread) names=(pool side_thread band gram_slices live_schedule absorb another_scene) ;;
     *) names=(kernel passes chroma picture combine gram gram_slices robust_fill robust_parts pool side_thread resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done

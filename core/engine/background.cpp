@@ -28,7 +28,7 @@ Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room
                        const DecisionSteps& steps)
     : room_(room),
       learner_(std::move(learner)),
-      decision_(room.frames->width(), room.frames->height(), colours, steps) {
+      decision_(room.frames->width(), room.frames->band(), colours, steps) {
   learner_->begin(room_);
 }
 
@@ -95,8 +95,9 @@ void Background::finish(const MaskWishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
-  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold,
-                                                  wishes.ignored, room_.frames->width());
+  next_report_.foreground =
+      foreground_statistics(*snapshots_, models_[next()], wishes.threshold, wishes.ignored,
+                            room_.frames->width(), room_.frames->band());
   // Nobody decides before there is a first model.
   if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
     rehearse(wishes);

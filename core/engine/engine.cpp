@@ -36,13 +36,15 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   close();
   options_ = options;
   layout_ = layout_of(options, width, height);
-  auto learner = Learner::make(options, width, height);
+  const Band band = band_of(options, width, height);
+  auto learner = Learner::make(options, width, band);
   const bool live = options.mode == Mode::live;
   const LivePlan plan = plan_of(options, width, height);
-  workers_ = std::make_unique<Workers>(options.threads);
+  // What members tell each other has one order.
+  workers_ = std::make_unique<Workers>(options.threads, !options.team);
   const uint64_t beside = layout_.bytes - layout_.store_bytes;
   frames_ =
-      FrameStore(layout_.capacity, width, height, learner->contents(), options.max_memory - beside);
+      FrameStore(layout_.capacity, width, band, learner->contents(), options.max_memory - beside);
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -91,6 +93,12 @@ void Engine::flush() {
     if (soft_mask_) soft_mask_->forget();
   }
   pace_.restart();
+}
+
+void Engine::begin_anew() {
+  if (!configured() || pending() > 0) return;
+  background_->forget();
+  schedule_->go_on();
 }
 
 Status Engine::push(const ImageView& frame) {
@@ -269,12 +277,13 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
 bool Engine::write_background(const MutableImageView& out) {
   if (!configured() || !background_->known()) return false;
   schedule_->show_newest();
-  write_picture(task_of(Output::background), options_.levels, out, 0, frames_.height());
+  write_picture(task_of(Output::background), options_.levels, out, band().own_begin(),
+                band().own_rows());
   return true;
 }
 
 bool Engine::learnt(Learnt* learnt) {
-  if (!configured() || !background_->known()) return false;
+  if (!configured() || !background_->known() || !band().is_whole()) return false;
   // What it threw, the next frame is told.
   workers_->side().rest();
   schedule_->show_newest();
@@ -288,6 +297,8 @@ bool Engine::learnt(Learnt* learnt) {
 
 Status Engine::may_learn_from(const Learnt& learnt) const {
   if (!configured()) return {Status::Code::not_configured, "configure the engine before it learns"};
+  if (!band().is_whole())
+    return {Status::Code::invalid_options, "processes that share a window load no background"};
   if (learnt.width != frames_.width() || learnt.height != frames_.height())
     return {Status::Code::invalid_options,
             "it is the background of " + std::to_string(learnt.width) + "x" +
@@ -317,11 +328,11 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     }
     if (masked && options_.mask_softness > 0) soften(levels, &task);
     return_to_frame(&task, output == Output::background || output == Output::foreground);
-    const int height = frames_.height(), together = rows_together(out);
+    const int top = band().own_begin(), height = band().own_rows(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
     const auto write = [&](int first, int count, size_t) {
       const int row = first * together;
-      write_picture(task, levels, out, row, std::min(count * together, height - row));
+      write_picture(task, levels, out, top + row, std::min(count * together, height - row));
     };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
@@ -331,6 +342,16 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     } else {
       write(0, steps, 0);
     }
+  });
+}
+
+const uint8_t* Engine::whole_mask() {
+  if (!ready()) return nullptr;
+  const Clock::Span span(clock_, Clock::frames);
+  return flushed_if_it_throws([&] {
+    OutputTask task = next_task(Output::mask);
+    decide_next(&task);
+    return background_->decision().whole_mask();
   });
 }
 

@@ -19,6 +19,11 @@ ChromaShape shape_of(int width, int height, const FrameContents& contents) {
   return {width, height, contents.chroma_columns, contents.chroma_rows};
 }
 
+// Samples of a channel, of the own rows.
+size_t samples_of(const Band& band, int width, int step) {
+  return static_cast<size_t>(band.samples(step)) * sample_count(width, step);
+}
+
 // Samples of chroma that are spread to all pixels.
 size_t spread_size(int width, int height, const FrameContents& contents) {
   const bool needed = contents.sample_step > 1 || contents.cells_along > 0;
@@ -32,33 +37,36 @@ uint8_t first_alpha(const ImageView& frame) {
 
 }  // namespace
 
-FrameStore::FrameStore(int capacity, int width, int height, const FrameContents& contents,
+FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameContents& contents,
                        uint64_t most_bytes)
-    : width_(width),
-      height_(height),
+    : band_(band),
+      width_(width),
+      height_(band.rows()),
       sample_step_(contents.sample_step),
       most_bytes_(most_bytes),
-      planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height, contents))
-                                          : Window(capacity, pixels_of(width, height))),
-      spread_(spread_size(width, height, contents)),
+      planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height_, contents))
+                                          : Window(capacity, pixels_of(width, height_))),
+      spread_(spread_size(width, height_, contents)),
       constant_alpha_(static_cast<size_t>(capacity), 255),
       varies_(static_cast<size_t>(capacity), 0),
       poses_(static_cast<size_t>(capacity)) {
-  if (sample_step_ > 1) samples_ = PlaneSlots(capacity, sample_count(width, height, sample_step_));
+  if (sample_step_ > 1) samples_ = PlaneSlots(capacity, samples_of(band, width, sample_step_));
   if (contents.cells_along > 0) {
-    grid_ = Grid(width, height, contents.cells_along);
+    grid_ = Grid(width, band.height(), contents.cells_along);
     cells_ = GridFrames(grid_, capacity);
   }
 }
 
-uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
+uint64_t FrameStore::bytes(int capacity, int width, const Band& band,
+                           const FrameContents& contents) {
+  const int height = band.rows();
   uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents));
   uint64_t beside =
       (2 + sizeof(Pose)) * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
   if (contents.sample_step > 1)
-    beside += PlaneSlots::bytes(capacity, sample_count(width, height, contents.sample_step));
+    beside += PlaneSlots::bytes(capacity, samples_of(band, width, contents.sample_step));
   if (contents.cells_along > 0)
-    beside += GridFrames::bytes(Grid(width, height, contents.cells_along), capacity);
+    beside += GridFrames::bytes(Grid(width, band.height(), contents.cells_along), capacity);
   if (__builtin_add_overflow(bytes, beside, &bytes)) return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
@@ -88,11 +96,12 @@ void FrameStore::take_contents(int slot) {
   if (sample_step_ > 1 || cells_.cells() > 0) read_planes(planes_, slot, spread_.data(), planes);
   if (sample_step_ > 1) {
     samples_.pad(slot);
+    const int top = band_.first_sample(sample_step_);
     for (int c = 0; c < kChannels; ++c)
-      take_samples(planes[c], width_, height_, sample_step_, samples_.plane(slot, c));
+      take_samples(planes[c] + ptrdiff_t{top - band_.first()} * width_, width_,
+                   band_.own_end() - top, sample_step_, samples_.plane(slot, c));
   }
-  if (cells_.cells() > 0)
-    for (int c = 0; c < kChannels; ++c) cell_means(grid_, planes[c], cells_.plane(slot, c));
+  if (cells_.cells() > 0) find_cells(grid_, band_, planes, &cells_, slot);
 }
 
 bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {

@@ -9,6 +9,7 @@
 #include "core/align/resampler.h"
 #include "core/base/image_view.h"
 #include "core/gram/window.h"
+#include "core/parallel/band.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
@@ -23,17 +24,18 @@ struct FrameContents {
 };
 
 // The newest `capacity` frames of width x height pixels: planes, samples, cells, alpha. Everything
-// of a frame is in the slot that append() names.
+// of a frame is in the slot that append() names. Of a band, planes and alpha have the rows that are
+// kept, samples are the own ones, and cells those of the whole picture, which members share.
 class FrameStore {
  public:
   FrameStore() = default;
   // Takes all memory but that for alpha that varies, which append() may take once, `most_bytes` in
   // all at most. Throws std::bad_alloc.
-  FrameStore(int capacity, int width, int height, const FrameContents& contents,
+  FrameStore(int capacity, int width, const Band& band, const FrameContents& contents,
              uint64_t most_bytes = UINT64_MAX);
 
   // The bytes that such a store takes, without alpha that varies.
-  static uint64_t bytes(int capacity, int width, int height, const FrameContents& contents);
+  static uint64_t bytes(int capacity, int width, const Band& band, const FrameContents& contents);
   // Those that it has taken.
   uint64_t bytes() const;
   // With alpha that varies.
@@ -53,7 +55,8 @@ class FrameStore {
   void clear() { planes_.clear(); }
 
   int width() const { return width_; }
-  int height() const { return height_; }
+  int height() const { return height_; }  // rows that are kept
+  const Band& band() const { return band_; }
   int capacity() const { return planes_.capacity(); }
   // Frames held, in the order in which they came.
   const Window& window() const { return planes_; }
@@ -84,6 +87,7 @@ class FrameStore {
   bool take_planes(int slot, const ImageView& frame, uint8_t alpha);
   void take_contents(int slot);
 
+  Band band_;
   int width_ = 0, height_ = 0, sample_step_ = 1;
   uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
   Window planes_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 
 namespace qdmd {
 namespace {
@@ -89,14 +90,15 @@ void SlidingGram::list_planes(const SnapshotRange& span) {
     for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
 }
 
-void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
+void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length,
+                            bool begins) {
   make_room();
   list_planes(span);
   // Each snapshot needs those up to itself only: what comes after is the mirror image.
   for (int start = span.size() - count; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
     multiply(end - start, end, first, length);
-    store(span, start, end, first == 0);
+    store(span, start, end, begins);
   }
 }
 
@@ -202,6 +204,25 @@ IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
       gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block;
       gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block.transpose();
     }
+  return gram;
+}
+
+IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots, Team* team) const {
+  IntegerMatrix gram = matrix(snapshots);
+  if (!team) return gram;
+  // What lies above the diagonal is the mirror image. A snapshot at a time: there is no second
+  // matrix.
+  const Eigen::Index size = gram.cols();
+  std::vector<int64_t> values(static_cast<size_t>(kChannels * size));
+  for (Eigen::Index t = 0; t < size; t += kChannels) {
+    const Eigen::Index below = size - t;
+    const auto block = std::span(values).first(static_cast<size_t>(kChannels * below));
+    Eigen::Map<IntegerMatrix> sums(block.data(), below, kChannels);
+    sums = gram.block(t, t, below, kChannels);
+    team->sum(Talk::products, block);
+    gram.block(t, t, below, kChannels) = sums;
+    gram.block(t, t, kChannels, below) = sums.transpose();
+  }
   return gram;
 }
 

@@ -9,6 +9,7 @@
 #include "core/gram/shared_chroma.h"
 #include "core/gram/window.h"
 #include "core/parallel/pool.h"
+#include "core/parallel/team.h"
 #include "core/quaternion/matrix.h"
 
 namespace qdmd {
@@ -42,13 +43,19 @@ class SlidingGram {
   // that begins at pixel 0 comes first and forgets the group's old products; the others follow in
   // any order and size. The group's elements of matrix() are valid once its slices have covered
   // every pixel once. Between slices, other frames may be appended.
-  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length);
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
+    add_slice(span, count, first, length, first == 0);
+  }
+  // The same of planes of which another pixel is the first that counts. begins: that slice does.
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length, bool begins);
   // The same for snapshots of the shape, as far as the pixels of chroma rows first .. first + count
   // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
   void add_rows(const SnapshotRange& span, int frames, int first, int count);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;
+  // Summed over all members of a team, whose planes have the other pixels; null: there are none.
+  IntegerMatrix matrix(const SnapshotRange& snapshots, Team* team) const;
 
  private:
   size_t threads() const { return pool_ ? pool_->threads() : 1; }

@@ -23,10 +23,11 @@ constexpr size_t kRun = 1024;
 
 }  // namespace
 
-GramLearner::GramLearner(const LearnOptions& options, int width, int height)
+GramLearner::GramLearner(const LearnOptions& options, int width, const Band& band)
     : options_(options),
+      band_(band),
       width_(width),
-      height_(height),
+      height_(band.rows()),
       step_(options.sample_step > 0 ? options.sample_step : kChosenStep) {}
 
 uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int threads) const {
@@ -35,7 +36,7 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
-  const double seen = static_cast<double>(sample_count(width_, height_, step_));
+  const double seen = pixels_seen();
   return SlidingGram::bytes(capacity, threads) +
          (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
@@ -74,8 +75,12 @@ double GramLearner::solve_seconds(int window_size) const {
 
 uint64_t GramLearner::solver_bytes(int window_size) const {
   if (options_.method == Method::dmd || options_.dmd.solver != Solver::adjoint) return 0;
-  return static_cast<uint64_t>(
-      adjoint_bytes(static_cast<double>(sample_count(width_, height_, step_)), window_size));
+  return static_cast<uint64_t>(adjoint_bytes(pixels_seen(), window_size));
+}
+
+// By the decomposition, those of other members included.
+double GramLearner::pixels_seen() const {
+  return static_cast<double>(sample_count(width_, band_.height(), step_));
 }
 
 void GramLearner::begin(const LearnerRoom& room) {
@@ -105,8 +110,17 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
       gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
     return;
   }
-  gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
-                  slice.size(columns.plane_size(), kUnit));
+  if (band_.is_whole()) {
+    gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
+                    slice.size(columns.plane_size(), kUnit));
+    return;
+  }
+  // Other members answer for the rows around.
+  const auto row = static_cast<size_t>(width_);
+  const size_t before = step_ > 1 ? 0 : static_cast<size_t>(band_.own_begin()) * row;
+  const size_t own = step_ > 1 ? columns.pixels() : static_cast<size_t>(band_.own_rows()) * row;
+  gram_.add_slice(columns, frames, before + slice.first(own, kUnit), slice.size(own, kUnit),
+                  slice.index == 0);
 }
 
 void GramLearner::decompose(const SnapshotRange& snapshots) {
@@ -117,8 +131,9 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
     const SnapshotRange columns = columns_of(snapshots);
     Decomposition decomposition =
         options_.method == Method::dmd
-            ? decompose_channels(gram_.matrix(columns), options_.dmd)
-            : qdmd::decompose(columns, gram_.matrix(columns), options_.dmd);
+            ? decompose_channels(gram_.matrix(columns, band_.team()), options_.dmd)
+            : qdmd::decompose(columns, gram_.matrix(columns, band_.team()), options_.dmd,
+                              pixels_seen());
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
     background_ = std::move(decomposition.background);

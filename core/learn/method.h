@@ -19,6 +19,8 @@ struct LearnOptions {
   int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
+  // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
+  bool remembers = true;
 
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
 };

@@ -236,10 +236,16 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
 
 void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
+  fill_samples(reference, bits, x, gain, reach, {0, reference.height, step}, out);
+}
+
+void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, const uint8_t* reach, const SampledRows& rows,
+                  uint8_t* const out[3]) {
   const bool lit = is_lit(gain);
   size_t sample = 0;
-  for (int row = 0; row < reference.height; row += step)
-    for (int col = 0; col < reference.width; col += step, ++sample) {
+  for (int row = rows.first; row < rows.end; row += rows.step)
+    for (int col = 0; col < reference.width; col += rows.step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
       const int limit = is_masked(bits, p) ? 0 : reach[p];

@@ -5,6 +5,7 @@
 
 #include "core/gram/window.h"
 #include "core/passes/mask.h"
+#include "core/passes/sampling.h"
 
 namespace qdmd {
 
@@ -59,5 +60,9 @@ class Filler {
 // ceil(height / step) samples a channel.
 void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]);
+// The same of some rows.
+void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, const uint8_t* reach, const SampledRows& rows,
+                  uint8_t* const out[3]);
 
 }  // namespace qdmd

@@ -23,8 +23,8 @@ Recollection Earlier::recollection(float most) const {
 }
 
 void Earlier::take(const Grid& grid, const Reference& background,
-                   const std::vector<uint8_t>& spread, const StableFrames& stable, int count,
-                   float fresh) {
+                   const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
+                   const StableFrames& stable, int count, float fresh) {
   known_ = false;
   weight_.resize(grid.cells());
   for (size_t cell = 0; cell < grid.cells(); ++cell) {
@@ -37,7 +37,8 @@ void Earlier::take(const Grid& grid, const Reference& background,
   spread_ = spread;
   for (size_t c = 0; c < kChannels; ++c) {
     level_[c] = background.level[c];
-    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+    const int channel = static_cast<int>(c);
+    std::copy_n(cells.plane(at, channel), cells.cells(), cells_.plane(0, channel));
   }
   known_ = true;
 }

@@ -30,8 +30,9 @@ class Earlier {
   // Replaces what is known by a window's background and the frames that showed it; where these
   // include what was known (frame `count` of `stable`), it is confirmed. fresh: the share of the
   // window's frames that no window before had. spread: as median_picture() has it, blurred.
+  // cells: the background's are picture `at` of them.
   void take(const Grid& grid, const Reference& background, const std::vector<uint8_t>& spread,
-            const StableFrames& stable, int count, float fresh);
+            const GridFrames& cells, int at, const StableFrames& stable, int count, float fresh);
 
   // What is known, for a file and back; its grid may be another, and each cell then knows what the
   // one at its middle did. Where read() throws, all is as it was.

@@ -48,8 +48,11 @@ struct RobustParameters {
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
  public:
-  RobustLearner(const LearnOptions& options, int width, int height,
+  RobustLearner(const LearnOptions& options, int width, const Band& band,
                 const RobustParameters& parameters = {});
+
+  // Pixels of a band's background depend on rows so far from them.
+  static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
 
   FrameContents contents() const override { return {1, parameters_.cells_along}; }
   std::vector<int> sample_steps() const override;
@@ -87,17 +90,20 @@ class RobustLearner : public Learner {
  private:
   size_t pixels() const { return reference_.pixels(); }
   size_t samples_at(int step) const;
+  SampledRows sampled_rows() const;
   int remembered_frames(int window_size) const;
   // Of the first snapshot, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }
   void start(const SnapshotRange& snapshots);
   void refine_light(const SnapshotRange& snapshots);
+  void refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
+                    std::vector<Gain>* gains);
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
   void combine(const SnapshotRange& snapshots, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
-  std::vector<Gain> gains_of_frames() const;
+  std::vector<Gain> gains_of_frames();
   void keep_some();
   void mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
             BackgroundModel* model);
@@ -111,7 +117,8 @@ class RobustLearner : public Learner {
 
   LearnOptions options_;
   RobustParameters parameters_;
-  Grid grid_;
+  Band band_;
+  Grid grid_;  // of the whole picture
   int finest_step_, step_;
   LearnerRoom room_ = {};
   GridFrames background_cells_;  // of the published and the newest solve, in unit light
