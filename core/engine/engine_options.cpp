@@ -12,6 +12,12 @@
 namespace qdmd {
 namespace {
 
+// More than the sums of a Gram matrix can hold. Bytes of fewer pixels, in any window, are below
+// 2^63.
+bool has_too_many_pixels(int width, int height) {
+  return static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
+}
+
 LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   return LivePlan(options.window_size, options.hop_size, PlaneSlots::bytes(1, pixels),
@@ -47,11 +53,6 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   layout.frame_bytes =
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner.contents());
-  // Sums over more pixels than the Gram matrix can have may be any number.
-  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36) {
-    layout.bytes = UINT64_MAX;
-    return layout;
-  }
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks = Decision::bytes(width, height) + layout.soft_bytes;
   const uint64_t camera = options.stabilize == Stabilize::off
@@ -76,6 +77,11 @@ Models models_of(Mode mode, int late_frames) {
 }
 
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
+  if (has_too_many_pixels(width, height)) {
+    EngineLayout layout;
+    layout.bytes = UINT64_MAX;
+    return layout;
+  }
   const auto learner = Learner::make(options, width, height);
   if (options.mode == Mode::live)
     return layout_with(options, *learner, width, height,
@@ -115,10 +121,12 @@ Status check_options(const EngineOptions& options, int width, int height) {
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
   const EngineLayout layout = layout_of(options, width, height);
-  const uint64_t solver =
-      layout.bytes == UINT64_MAX
-          ? 0
-          : Learner::make(options, width, height)->solver_bytes(options.window_size);
+  if (layout.bytes == UINT64_MAX)
+    return {Code::too_much_memory,
+            "A window-size of " + describe(options, width, height) +
+                " needs more memory than there can be, whatever max-memory allows: scale the video "
+                "down, or lower window-size."};
+  const uint64_t solver = Learner::make(options, width, height)->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
             "solver=adjoint with a window-size of " + describe(options, width, height) +

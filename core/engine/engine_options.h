@@ -47,6 +47,7 @@ struct EngineLayout {
   uint64_t soft_bytes = 0;   // of soft masks
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
+// Bytes are UINT64_MAX, and the rest is nothing, where there are too many pixels.
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
 
 // Models of batch and live mode.

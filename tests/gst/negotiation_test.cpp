@@ -167,6 +167,51 @@ TEST(Limits, TooLargeAWindowIsAnErrorThatSaysWhatToChange) {
   EXPECT_NE(std::string::npos, text.find(std::to_string(3ull * 200 * 4096 * 2160))) << text;
 }
 
+// Of an element whose sink pad is given caps by hand.
+std::string said_of_caps(const std::string& launch, const std::string& text) {
+  GstElement* element = gst_parse_launch(launch.c_str(), nullptr);
+  GstBus* bus = gst_bus_new();
+  gst_element_set_bus(element, bus);
+  GstPad* sink = gst_element_get_static_pad(element, "sink");
+  gst_element_set_state(element, GST_STATE_PAUSED);
+  gst_pad_send_event(sink, gst_event_new_stream_start("limits"));
+  GstCaps* caps = gst_caps_from_string(text.c_str());
+  EXPECT_FALSE(gst_pad_send_event(sink, gst_event_new_caps(caps)));
+  gst_caps_unref(caps);
+  GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
+  std::string said;
+  if (message) {
+    GError* error = nullptr;
+    gst_message_parse_error(message, &error, nullptr);
+    EXPECT_TRUE(g_error_matches(error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT));
+    said = error->message;
+    g_error_free(error);
+    gst_message_unref(message);
+  }
+  gst_element_set_state(element, GST_STATE_NULL);
+  gst_element_set_bus(element, nullptr);
+  gst_object_unref(bus);
+  gst_object_unref(sink);
+  gst_object_unref(element);
+  return said;
+}
+
+TEST(Limits, BytesThatNoMachineHasAreRefusedWithTheCaps) {
+  for (const char* size :
+       {"width=8192,height=8192", "width=65536,height=65536", "width=2147483647,height=2147483647",
+        "width=2147483647,height=1", "width=1,height=2147483647"})
+    for (const char* element : {"qdmdbackground", "qdmdseparate"})
+      for (const char* mode : {"batch", "live"})
+        for (const char* format : {"RGB", "RGBA", "I420", "GRAY8"}) {
+          const std::string said =
+              said_of_caps(std::string(element) + " window-size=2048 mode=" + mode,
+                           std::string("video/x-raw,framerate=25/1,format=") + format + "," + size);
+          for (const char* word : {"window-size", "max-memory"})
+            EXPECT_NE(std::string::npos, said.find(word))
+                << element << " " << mode << " " << format << " " << size << ": " << said;
+        }
+}
+
 TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {
   GQuark domain = 0;
   int code = 0;
