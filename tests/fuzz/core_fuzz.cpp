@@ -23,6 +23,7 @@ namespace allocator = qdmd::test::allocator;
 class Frame {
  public:
   Frame(int width, int height, int layout) : width_(width), height_(height), layout_(layout) {
+    const allocator::Unseen unseen;
     const auto pixels = static_cast<size_t>(width * height);
     memory_.resize(layout == 0 ? 3 * pixels : layout == 1 ? 4 * pixels : pixels);
   }
@@ -167,6 +168,7 @@ class EngineTrial {
     if (!status.ok()) return;
     width_ = width, height_ = height;
     waiting_ = 0;
+    const allocator::Unseen unseen;
     frame_ = std::make_unique<Frame>(width, height, bytes_.below(3));
     QDMD_DEMAND(engine_.delay() >= 0);
   }
@@ -190,8 +192,13 @@ class EngineTrial {
       engine_.write(static_cast<Output>(bytes_.below(4)), Levels(), out.view<uint8_t>());
     if (bytes_.once_in(8)) {
       const auto pixels = static_cast<size_t>(width_ * height_);
-      std::vector<uint8_t> mask(pixels), residual(pixels);
-      engine_.foreground(mask.data(), residual.data());
+      // In one, whose halves they are.
+      std::vector<uint8_t> both;
+      {
+        const allocator::Unseen unseen;
+        both.resize(2 * pixels);
+      }
+      engine_.foreground(both.data(), both.data() + pixels);
     }
     engine_.skip();
     --waiting_;
@@ -289,6 +296,7 @@ class EngineTrial {
     const bool known = engine_.learnt(&learnt);
     kept_ = false;
     if (!known) return;
+    const allocator::Unseen unseen;
     Learnt read;
     QDMD_DEMAND(unpack(pack(learnt), &read).ok());
     learnt_ = std::move(read);
@@ -308,7 +316,7 @@ class EngineTrial {
   std::unique_ptr<Frame> frame_;
   int width_ = 0, height_ = 0, waiting_ = 0, time_ = 0;
   bool failed_ = false;  // an allocation, by now
-  bool kept_ = false;  // no frame may be lost by what is called now
+  bool kept_ = false;    // no frame may be lost by what is called now
 };
 
 void try_library(fuzz::Bytes* bytes) {

@@ -263,6 +263,9 @@ class ElementTrial {
     if (bytes_.once_in(8)) segment.rate = -1;
     if (bytes_.once_in(8)) segment.start = segment.position = bytes_.word();
     if (bytes_.once_in(8)) segment.stop = segment.start + bytes_.word();
+    // GStreamer asserts that what runs backwards has an end.
+    if (segment.rate < 0 && segment.stop == GST_CLOCK_TIME_NONE)
+      segment.stop = segment.start + GST_SECOND;
     push_event(gst_event_new_segment(&segment));
   }
 

@@ -212,6 +212,48 @@ TEST(Limits, BytesThatNoMachineHasAreRefusedWithTheCaps) {
         }
 }
 
+// One lie of a buffer's metadata about where its planes are.
+struct Lie {
+  guint plane;
+  gsize offset;  // bytes more
+  gint stride;   // bytes more
+  guint planes;  // fewer
+  guint width;   // fewer
+};
+
+TEST(Limits, MetadataThatPointsOutsideOfItsBufferIsAnError) {
+  const Lie lies[] = {{0, 0, 1, 0, 0},        {0, 1 << 20, 0, 0, 0}, {0, 0, G_MAXINT / 2, 0, 0},
+                      {0, 0, G_MININT, 0, 0}, {0, 4, 0, 0, 0},       {0, 0, 0, 1, 0},
+                      {0, 0, 0, 0, 1}};
+  for (const char* launch : {"qdmdbackground window-size=2", "qdmdbackground mode=live"})
+    for (GstVideoFormat format :
+         {GST_VIDEO_FORMAT_RGB, GST_VIDEO_FORMAT_BGRA, GST_VIDEO_FORMAT_I420, GST_VIDEO_FORMAT_NV12,
+          GST_VIDEO_FORMAT_YUY2})
+      for (Lie lie : lies) {
+        Stream stream(launch, format, 40, 24);
+        // The last plane is the one that ends with the buffer.
+        lie.plane = stream.info().finfo->n_planes - 1;
+        gsize offset[GST_VIDEO_MAX_PLANES] = {};
+        gint stride[GST_VIDEO_MAX_PLANES] = {};
+        for (guint i = 0; i <= lie.plane; ++i) {
+          offset[i] = stream.info().offset[i];
+          stride[i] = stream.info().stride[i];
+        }
+        offset[lie.plane] += lie.offset;
+        stride[lie.plane] += lie.stride;
+        BufferPtr honest = make_bytes(stream.info(), 0), lying = make_bytes(stream.info(), 1);
+        stream.stamp(honest.get(), 0);
+        stream.stamp(lying.get(), 1);
+        gst_buffer_add_video_meta_full(lying.get(), GST_VIDEO_FRAME_FLAG_NONE, format,
+                                       40 - lie.width, 24, lie.plane + 1 - lie.planes, offset,
+                                       stride);
+        EXPECT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), honest.release()));
+        EXPECT_EQ(GST_FLOW_ERROR, gst_harness_push(stream.harness(), lying.release()))
+            << gst_video_format_to_string(format) << " offset +" << lie.offset << " stride +"
+            << lie.stride << " planes -" << lie.planes << " width -" << lie.width;
+      }
+}
+
 TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {
   GQuark domain = 0;
   int code = 0;
