@@ -109,7 +109,12 @@ class ElementTrial {
     outlet.trial = this;
     outlet.source = source;
     outlet.requested = requested;
-    outlet.sink = gst_pad_new("down", GST_PAD_SINK);
+    // Without a template it would take the caps that it has, and no others.
+    GstCaps* any = gst_caps_new_any();
+    GstPadTemplate* takes_any = gst_pad_template_new("down", GST_PAD_SINK, GST_PAD_ALWAYS, any);
+    gst_caps_unref(any);
+    outlet.sink = gst_pad_new_from_template(takes_any, "down");
+    gst_object_unref(takes_any);
     gst_object_ref_sink(outlet.sink);
     gst_pad_set_element_private(outlet.sink, &outlet);
     gst_pad_set_chain_function(outlet.sink, take);
