@@ -138,10 +138,11 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
     GstCaps* caps = nullptr;
     GstVideoInfo info;
     gst_event_parse_caps(event, &caps);
+    const bool known = gst_video_info_from_caps(&info, caps);
     // Frames that wait belong to the old caps; equal caps change nothing.
-    if (!filter->negotiated || !gst_video_info_from_caps(&info, caps) ||
-        !gst_video_info_is_equal(&info, &filter->in_info))
+    if (!filter->negotiated || !known || !gst_video_info_is_equal(&info, &filter->in_info))
       qdmd::drain(GST_ELEMENT(trans));
+    if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);
   }
   qdmd::before_event(GST_ELEMENT(trans), event);
   return GST_BASE_TRANSFORM_CLASS(parent_class)->sink_event(trans, event);

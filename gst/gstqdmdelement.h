@@ -20,6 +20,8 @@ bool start(GstElement* self);
 // The video that comes has these caps: the engine begins anew. With the stream lock. False: an
 // error was posted.
 bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps);
+// Posts why caps that are no video to GStreamer are refused. Its frames have 2 GB at most.
+void tell_of_caps(GstElement* self, GstCaps* caps);
 // An event is about to be forwarded, from the streaming thread: what it ends is sent or dropped
 // first. Caps are the element's own affair.
 void before_event(GstElement* self, GstEvent* event);

@@ -314,7 +314,7 @@ GstFlowReturn drain(GstElement* self) {
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
   const auto solve = [self](Engine& engine) {
-    const Status status = engine.drain();
+    Status status = engine.drain();
     note_solve(self, nullptr);
     return status;
   };
@@ -416,7 +416,7 @@ bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& i
   const bool configured = with_engine(self, [&](Engine& engine) {
     state->background.keep(engine);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
-    const Status status =
+    Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
     state->colours = options.colours;
     if (status.ok())
@@ -519,7 +519,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       engine.set_masks_expected(masks);
       engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
-      const Status status = engine.push(frame.view<const uint8_t>());
+      Status status = engine.push(frame.view<const uint8_t>());
       note_solve(self, nullptr);
       return status;
     });

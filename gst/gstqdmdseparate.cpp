@@ -238,7 +238,11 @@ static gboolean gst_qdmd_separate_take_caps(GstElement* self, GstCaps* caps) {
   // Frames that wait belong to the old caps.
   qdmd::drain(self);
   GstVideoInfo info;
-  if (!gst_video_info_from_caps(&info, caps) || !qdmd::begin_video(self, info, caps)) return FALSE;
+  if (!gst_video_info_from_caps(&info, caps)) {
+    qdmd::tell_of_caps(self, caps);
+    return FALSE;
+  }
+  if (!qdmd::begin_video(self, info, caps)) return FALSE;
   state->sync();
   state->each([caps](GstQdmdOutlet* outlet) { qdmd::negotiate_outlet(outlet, caps); });
   return TRUE;

@@ -38,11 +38,42 @@ inline guint8* component_data(const GstVideoFrame& frame, int component) {
          (wide && offset % 2 == 1 ? offset : 0);
 }
 
-// Maps a buffer for as long as it lives. The map is released before the buffer is handed on.
+// What a buffer's metadata says of it is a frame of these caps; more pixels may lie around it.
+inline bool suits(const GstVideoInfo& info, const GstVideoMeta* meta) {
+  return !meta || (meta->format == GST_VIDEO_INFO_FORMAT(&info) &&
+                   meta->n_planes == GST_VIDEO_INFO_N_PLANES(&info) &&
+                   meta->width >= guint(info.width) && meta->height >= guint(info.height));
+}
+
+// All samples are inside of what was mapped. GStreamer does not look: offsets and strides of the
+// metadata are whatever upstream has written there.
+inline bool has_all_samples(const GstVideoFrame& frame) {
+  for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(&frame); ++c) {
+    const guint plane = GST_VIDEO_FRAME_COMP_PLANE(&frame, c);
+    const GstMapInfo& map = frame.map[frame.meta ? plane : 0];
+    const gint64 before = static_cast<const guint8*>(frame.data[plane]) - map.data;
+    const gint64 last_row =
+        gint64{GST_VIDEO_FRAME_COMP_HEIGHT(&frame, c) - 1} * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c);
+    const gint64 row =
+        gint64{GST_VIDEO_FRAME_COMP_WIDTH(&frame, c)} * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c);
+    if (before + std::min<gint64>(last_row, 0) < 0 ||
+        before + std::max<gint64>(last_row, 0) + row > gint64(map.size))
+      return false;
+  }
+  return true;
+}
+
+// Maps a buffer for as long as it lives. The map is released before the buffer is handed on. False
+// where the buffer does not hold a frame of these caps.
 class MappedVideoFrame {
  public:
   MappedVideoFrame(const GstVideoInfo* info, GstBuffer* buffer, GstMapFlags flags)
-      : mapped_(gst_video_frame_map(&frame_, const_cast<GstVideoInfo*>(info), buffer, flags)) {}
+      : mapped_(suits(*info, gst_buffer_get_video_meta(buffer)) &&
+                gst_video_frame_map(&frame_, const_cast<GstVideoInfo*>(info), buffer, flags)) {
+    if (!mapped_ || has_all_samples(frame_)) return;
+    gst_video_frame_unmap(&frame_);
+    mapped_ = false;
+  }
   ~MappedVideoFrame() {
     if (mapped_) gst_video_frame_unmap(&frame_);
   }

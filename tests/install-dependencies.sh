@@ -2,7 +2,8 @@
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
-#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv
+#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
+#                                               fuzz, tidy, coverage
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -25,6 +26,9 @@ demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
 docs=(python3 python3-matplotlib)
 # What tests/pages/stream.sh compares with.
 opencv=(python3-numpy python3-opencv)
+fuzz=(clang)
+tidy=(clang-tidy)
+coverage=(gcovr)
 
 wanted=()
 for group in "$@"; do
@@ -35,7 +39,10 @@ for group in "$@"; do
     demo) wanted+=("${demo[@]}") ;;
     docs) wanted+=("${docs[@]}") ;;
     opencv) wanted+=("${opencv[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv)" >&2; exit 2 ;;
+    fuzz) wanted+=("${fuzz[@]}") ;;
+    tidy) wanted+=("${tidy[@]}") ;;
+    coverage) wanted+=("${coverage[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage)" >&2; exit 2 ;;
   esac
 done
 

@@ -15,6 +15,11 @@ namespace {
 
 // The most that may share pictures of this size: each has rows of cells.
 int most_members(int width, int height) { return Grid(width, height).rows; }
+// More than the sums of a Gram matrix can hold. Bytes of fewer pixels, in any window, are below
+// 2^63.
+bool has_too_many_pixels(int width, int height) {
+  return static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
+}
 
 LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
@@ -53,11 +58,6 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   layout.frame_bytes =
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, learner.contents());
-  // Sums over more pixels than the Gram matrix can have may be any number.
-  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(picture_height) >> 36) {
-    layout.bytes = UINT64_MAX;
-    return layout;
-  }
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks = Decision::bytes(width, band) + layout.soft_bytes;
   const uint64_t camera = options.stabilize == Stabilize::off
@@ -83,6 +83,11 @@ Models models_of(Mode mode, int late_frames) {
 }
 
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
+  if (has_too_many_pixels(width, height)) {
+    EngineLayout layout;
+    layout.bytes = UINT64_MAX;
+    return layout;
+  }
   const auto learner = Learner::make(options, width, band_of(options, width, height));
   if (options.mode == Mode::live)
     return layout_with(options, *learner, width, height,
@@ -162,10 +167,13 @@ Status check_options(const EngineOptions& options, int width, int height) {
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
   if (Status status = check_team(options, width, height); !status.ok()) return status;
   const EngineLayout layout = layout_of(options, width, height);
-  const uint64_t solver = layout.bytes == UINT64_MAX
-                              ? 0
-                              : Learner::make(options, width, band_of(options, width, height))
-                                    ->solver_bytes(options.window_size);
+  if (layout.bytes == UINT64_MAX)
+    return {Code::too_much_memory,
+            "A window-size of " + describe(options, width, height) +
+                " needs more memory than there can be, whatever max-memory allows: scale the video "
+                "down, or lower window-size."};
+  const uint64_t solver = Learner::make(options, width, band_of(options, width, height))
+                              ->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
             "solver=adjoint with a window-size of " + describe(options, width, height) +

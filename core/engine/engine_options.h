@@ -52,6 +52,7 @@ struct EngineLayout {
   uint64_t soft_bytes = 0;   // of soft masks
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
+// Bytes are UINT64_MAX, and the rest is nothing, where there are too many pixels.
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
 
 // The rows that this process has of frames of that size: it pushes those that are kept, and has
