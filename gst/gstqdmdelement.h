@@ -8,7 +8,9 @@
 #define QDMD_FORMATS                                                                          \
   "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, YV12, NV21, " \
   "Y42B, "                                                                                    \
-  "NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8 }"
+  "NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8, "                                               \
+  "I420_10LE, I422_10LE, Y444_10LE, P010_10LE, I420_12LE, I422_12LE, Y444_12LE, P012_LE, "    \
+  "Y444_16LE, P016_LE, GRAY16_LE, RGBA64_LE, ARGB64 }"
 
 namespace qdmd {
 

@@ -42,6 +42,7 @@ class Engine {
   // Writes a picture of the next frame, which stays the next: any number of pictures share what is
   // computed of it. Call only while ready(); `out` has the configured size. Its black, white and
   // neutral chroma are `levels`: the configured ones, or, of a mask in another format, its own.
+  // Samples have the configured depth, or 8 bits: the highest ones.
   void write(Output output, const Levels& levels, const MutableImageView& out);
   // The next frame has left. Call only while ready().
   void skip();

@@ -45,6 +45,7 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   // They are read until the last of them has left.
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   layout.frame_bytes =
+      (options.depth > 8 ? 2 : 1) *
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner.contents());
   // Sums over more pixels than the Gram matrix can have may be any number.
@@ -111,6 +112,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.mask_softness < 0 || options.mask_softness > kMostSoftness)
     return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
+  if (options.depth < 8 || options.depth > EngineOptions::kMostDepth)
+    return {Code::invalid_options, "a sample has 8 to 16 bits"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};

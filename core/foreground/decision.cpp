@@ -113,7 +113,8 @@ Decision::Shape::Shape(int width_, int height_, bool votes)
       reach(votes ? voting_reach(width, height) : 0),
       stride(static_cast<size_t>(width + 2 * margin)) {}
 
-Decision::Decision(int width, int height, Colours colours, const DecisionSteps& steps)
+Decision::Decision(int width, int height, Colours colours, const DecisionSteps& steps,
+                   const Levels& levels)
     : shape_(width, height, steps.vote),
       steps_(steps),
       knows_light_(steps.light && colours != Colours::grey),
@@ -125,7 +126,7 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
   of_.foreground.resize(shape_.padded());
   of_.mask.resize(shape_.pixels());
   of_.shaded.resize(shape_.pixels());
-  if (colours == Colours::yuv) black_[0] = 16, black_[1] = black_[2] = 128;
+  std::copy_n(levels.black, kChannels, black_);
 }
 
 uint64_t Decision::bytes(int width, int height) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
 #include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
@@ -47,8 +48,10 @@ struct Comparison {
 // come in the stream's order.
 class Decision {
  public:
-  // Takes all memory. For frames of width x height pixels of these colours.
-  Decision(int width, int height, Colours colours, const DecisionSteps& steps = {});
+  // Takes all memory. For frames of width x height pixels of these colours, in which black is that
+  // of `levels`.
+  Decision(int width, int height, Colours colours, const DecisionSteps& steps = {},
+           const Levels& levels = {});
   static uint64_t bytes(int width, int height);
 
   // The next frame is of another stream.
@@ -131,7 +134,7 @@ class Decision {
   DecisionSteps steps_;
   Shadows shadows_ = Shadows::background;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
-  uint8_t black_[3] = {0, 0, 0};
+  uint8_t black_[3];
   bool knows_light_;
   MovingTexture texture_;
   PixelNoise noise_;

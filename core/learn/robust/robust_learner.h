@@ -43,6 +43,8 @@ struct RobustParameters {
 //   repeat   what differs from the picture is foreground (find_mask) and becomes background
 //            (Filler); Q-DMD of the filled window, of rank 1 unless another is asked for, with
 //            amplitudes fitted to all frames, is the next background
+// Of samples of more than 8 bits the start, masks and inner products see the highest eight; what is
+// filled and combined last has all bits.
 // Global changes of light are divided out before and put back in L(t). Inner products are taken
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
@@ -50,7 +52,9 @@ class RobustLearner : public Learner {
   RobustLearner(const LearnOptions& options, int width, int height,
                 const RobustParameters& parameters = {});
 
-  FrameContents contents() const override { return {1, parameters_.cells_along}; }
+  FrameContents contents() const override {
+    return {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+  }
   std::vector<int> sample_steps() const override;
   bool in_one_piece() const override { return true; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
@@ -93,7 +97,7 @@ class RobustLearner : public Learner {
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
-  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
+  void combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames() const;
   void keep_some();
@@ -101,6 +105,8 @@ class RobustLearner : public Learner {
             BackgroundModel* model);
   void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                BackgroundModel* model);
+  void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
+                    BackgroundModel* model) const;
   void end(BackgroundModel* model);
 
   LearnOptions options_;
