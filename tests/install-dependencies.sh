@@ -9,11 +9,12 @@ build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins
   libeigen3-dev libhwy-dev libopencv-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -ugly and -x what
 # the documentation's pipelines and the demo encode and write text with, -opencv the element that
-# tests/bench compares with; gi runs the examples in Python.
+# tests/bench compares with, -libav what plays H.264 and H.265 of 10 bits; gi runs the examples in
+# Python.
 test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 valgrind
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
-  gstreamer1.0-plugins-ugly gstreamer1.0-x gstreamer1.0-opencv)
+  gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x gstreamer1.0-opencv)
 # What gst/debian/control asks for beyond build; tests make a package, too.
 package=(debhelper dpkg-dev libopencv-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
