@@ -25,9 +25,9 @@ struct Planes {
 };
 
 // What a model makes of one picture, for ever.
-BackgroundModel model_of(const Planes& background) {
+BackgroundModel model_of(const Planes& background, uint8_t limit = 12) {
   BackgroundModel model;
-  const std::vector<uint8_t> limits(background.pixels(), 12);
+  const std::vector<uint8_t> limits(background.pixels(), limit);
   model.make_room(background.pixels(), true);
   model.freeze_as(background.level, &limits, background.pixels());
   model.set_time(0);
@@ -36,13 +36,13 @@ BackgroundModel model_of(const Planes& background) {
 
 struct Decided {
   Decided(const Planes& background, const DecisionSteps& steps = {}, Colours colours = Colours::rgb,
-          const Levels& levels = {})
-      : model(model_of(background)),
+          const Levels& levels = {}, uint8_t limit = 12)
+      : model(model_of(background, limit)),
         decision(background.width, background.height, colours, steps, levels) {}
   const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
     decision.decide({{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
                      &model,
-                     18,
+                     threshold,
                      limits ? model.limits() : nullptr},
                     pool);
     return decision.mask();
@@ -50,6 +50,7 @@ struct Decided {
   BackgroundModel model;
   Decision decision;
   bool limits = true;  // of pixels
+  double threshold = 18;
 };
 
 // A floor with a texture, in colours.
@@ -72,7 +73,7 @@ size_t white(const uint8_t* mask, size_t count) {
 constexpr Levels kLimited = {{16, 128, 128}, {235, 128, 128}},
                  kFull = {{0, 128, 128}, {255, 128, 128}};
 
-// Half of the light: chroma goes with luma's distance from black, wherever black is.
+// Less light: chroma goes with luma's distance from black, wherever black is.
 TEST(Light, GoesDownToTheBlackOfItsRange) {
   std::mt19937 rng(340);
   for (const Levels& levels : {kFull, kLimited}) {
@@ -81,19 +82,21 @@ TEST(Light, GoesDownToTheBlackOfItsRange) {
     for (int y = 0; y < 240; ++y)
       for (int x = 0; x < 320; ++x) {
         const int grain = static_cast<int>(rng() % 21) - 10;
-        floor.at(0, x, y) = static_cast<uint8_t>(black + 60 + grain);
-        floor.at(1, x, y) = static_cast<uint8_t>(128 - 30);
-        floor.at(2, x, y) = static_cast<uint8_t>(128 + 34);
+        floor.at(0, x, y) = static_cast<uint8_t>(black + 70 + grain);
+        floor.at(1, x, y) = static_cast<uint8_t>(128 - 90);
+        floor.at(2, x, y) = static_cast<uint8_t>(128 + 100);
       }
     Planes frame = floor;
     for (int y = 0; y < 240; ++y)
       for (int x = 0; x < 160; ++x)
         for (int c = 0; c < 3; ++c) {
           const int dark = levels.black[c], level = frame.at(c, x, y);
-          frame.at(c, x, y) = static_cast<uint8_t>(dark + (level - dark) / 2);
+          frame.at(c, x, y) = static_cast<uint8_t>(std::lround(dark + 0.6 * (level - dark)));
         }
     const auto white_of = [&](const Levels& assumed) {
-      Decided decided(floor, {}, Colours::yuv, assumed);
+      // Little noise, so that little rest is left to light.
+      Decided decided(floor, {}, Colours::yuv, assumed, 4);
+      decided.threshold = 8;
       return white(decided(frame), floor.pixels());
     };
     EXPECT_LT(white_of(levels), 0.01 * 160 * 240) << black;
