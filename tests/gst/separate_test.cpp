@@ -103,6 +103,10 @@ const Case kCases[] = {
     {"A420_robust", GST_VIDEO_FORMAT_A420, kRobust},
     {"GRAY8_batch", GST_VIDEO_FORMAT_GRAY8, kBatch},
     {"GRAY8_robust", GST_VIDEO_FORMAT_GRAY8, kRobust},
+    {"P010_10LE_robust", GST_VIDEO_FORMAT_P010_10LE, kRobust},
+    {"I420_12LE_live", GST_VIDEO_FORMAT_I420_12LE, kLive},
+    {"RGBA64_LE_batch", GST_VIDEO_FORMAT_RGBA64_LE, kBatch},
+    {"GRAY16_LE_robust_live", GST_VIDEO_FORMAT_GRAY16_LE, kRobustLive},
 };
 INSTANTIATE_TEST_SUITE_P(Formats, Same, testing::ValuesIn(kCases),
                          [](const auto& one) { return std::string(one.param.name); });
@@ -171,6 +175,35 @@ TEST(Formats, AMaskMayBeGreyBesideAnyPicture) {
         const uint8_t grey = mask[i].bytes[30 * y + x], level = expected[i].bytes[30 * y + x];
         ASSERT_EQ(level == 235 ? 255 : 0, grey) << i << " " << x << " " << y;
         white += grey == 255;
+      }
+  EXPECT_GT(white, 0u);
+}
+
+TEST(Formats, AGreyMaskOfDeepVideoHas8Bits) {
+  Rig rig(std::string("qdmdseparate shadows=foreground") + kSmall);
+  rig.listen("background", "video/x-raw,format=P010_10LE");
+  rig.listen("mask", "video/x-raw,format=GRAY8");
+  Rig luma(std::string("qdmdbackground output=mask shadows=foreground") + kSmall);
+  luma.listen("src");
+  for (Rig* one : {&rig, &luma}) {
+    one->start(GST_VIDEO_FORMAT_I420_10LE, 30, 22);
+    for (int t = 0; t < 12; ++t) ASSERT_EQ(GST_FLOW_OK, one->push(t));
+  }
+  const auto background = rig.at("background").take(), mask = rig.at("mask").take(),
+             expected = luma.at("src").take();
+  ASSERT_EQ(background.size(), mask.size());
+  ASSERT_EQ(expected.size(), mask.size());
+  ASSERT_FALSE(mask.empty());
+  EXPECT_NE(std::string::npos, background[0].caps.find("P010_10LE"));
+  size_t white = 0;
+  for (size_t i = 0; i < mask.size(); ++i)
+    for (size_t y = 0; y < 22; ++y)
+      for (size_t x = 0; x < 30; ++x) {
+        const int seen = mask[i].bytes[30 * y + x];
+        const auto* word = expected[i].bytes.data() + 60 * y + 2 * x;
+        ASSERT_EQ(seen == 255 ? 940 : 64, word[0] | word[1] << 8);
+        ASSERT_TRUE(seen == 0 || seen == 255);
+        white += seen == 255;
       }
   EXPECT_GT(white, 0u);
 }
