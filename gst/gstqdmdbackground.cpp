@@ -196,7 +196,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       "The gst-qdmd authors <gst-qdmd@localhost>");
   for (const auto& [name, direction] :
        {std::pair{"sink", GST_PAD_SINK}, std::pair{"src", GST_PAD_SRC}}) {
-    GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+    GstCaps* caps = gst_caps_from_string(QDMD_CAPS);
     gst_element_class_add_pad_template(element_class,
                                        gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps));
     gst_caps_unref(caps);
