@@ -11,7 +11,8 @@
  *
  * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
  * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in
- * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes.
+ * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes,
+ * twice as many in formats of more than 8 bits.
  *
  * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
  * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"
