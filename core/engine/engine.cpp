@@ -234,7 +234,10 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   const Pose pose = next_pose();
   if (pose.is_rest() || stabilize_output_) return;
   const int slot = frames_.slot(frames_.size() - queue_.pending);
-  for (int c = 0; c < kChannels; ++c) task->x[c] = frames_.untouched(slot, c);
+  for (int c = 0; c < kChannels; ++c) {
+    task->x[c] = frames_.untouched(slot, c);
+    if (frames_.low_bits() > 0) task->low[c] = frames_.untouched_low(slot, c);
+  }
   Resampler* const resampler = &stabilizer_->resampler();
   Pool* const pool = workers_->side().idle() ? &workers_->pool() : nullptr;
   if (level) {

@@ -49,11 +49,10 @@ class FrameStore {
   // undefined.
   bool append(const ImageView& frame);
   // The planes, samples and cells of frame `index` become what the canvas shows of them; the planes
-  // as they came stay in untouched(). Of more than 8 bits, moved planes have 8 and a half in the
-  // middle of what the others could be, and the low digits stay as they came. What is outside of
-  // the frame is as in the frame before, or, where there is none, as in this one. False, and
-  // nothing is done: there is no room in `most_bytes`, or the frame's pixels share samples. Throws
-  // std::bad_alloc.
+  // as they came stay in untouched(). Of more than 8 bits, moved planes have the highest 8, and
+  // below them the middle of what there can be. What is outside of the frame is as in the frame
+  // before, or, where there is none, as in this one. False, and nothing is done: there is no room
+  // in `most_bytes`, or the frame's pixels share samples. Throws std::bad_alloc.
   bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
   // Forgets all frames.
   void clear() { planes_.clear(); }
@@ -75,10 +74,8 @@ class FrameStore {
   SnapshotRange whole_samples(const SnapshotRange& range) const {
     return range.in(samples()).with_low(sample_step_ > 1 ? low_samples_ : low_, low_bits_);
   }
-  // Low digits of a frame as it came.
-  const uint8_t* low(int slot, int channel) const {
-    return pose(slot).is_rest() ? low_.plane(slot, channel) : untouched_low_.plane(slot, channel);
-  }
+  // What is below the planes, where low_bits() is not 0.
+  const uint8_t* low(int slot, int channel) const { return low_.plane(slot, channel); }
 
   // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.
   const PlaneSlots& samples() const { return sample_step_ > 1 ? samples_ : planes_; }
@@ -89,6 +86,9 @@ class FrameStore {
   // Where the frame's camera looked; and, where that is not at rest, its planes as they came.
   const Pose& pose(int slot) const { return poses_[static_cast<size_t>(slot)]; }
   const uint8_t* untouched(int slot, int channel) const { return untouched_.plane(slot, channel); }
+  const uint8_t* untouched_low(int slot, int channel) const {
+    return untouched_low_.plane(slot, channel);
+  }
   uint8_t constant_alpha(int slot) const { return constant_alpha_[static_cast<size_t>(slot)]; }
   // Low digits of alpha, where low_bits() is not 0.
   const uint8_t* alpha_low(int slot) const;
