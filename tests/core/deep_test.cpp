@@ -422,6 +422,32 @@ TEST(DeepEngine, OnePixelAndDarkFramesAreOrdinary) {
       }
 }
 
+// What is saved has 8 bits: the middle of what they may have been is the best guess.
+TEST(DeepEngine, GoesOnWithASavedBackground) {
+  std::mt19937 rng(37);
+  const auto frames = make_frames(12, rng, 0.4);
+  const EngineOptions options = options_of(12, Method::robust, kFrames);
+  DeepPicture picture({12, 0}, true);
+  Engine first, second;
+  Learnt learnt;
+  ASSERT_TRUE(first.configure(options, kWidth, kHeight).ok());
+  for (const Frame& frame : frames) {
+    picture.fill(frame);
+    ASSERT_TRUE(first.push(picture.view<const uint8_t>()).ok());
+  }
+  ASSERT_TRUE(first.learnt(&learnt));
+  ASSERT_TRUE(first.write_background(picture.view<uint8_t>()));
+  const Frame known = picture.samples();
+  ASSERT_TRUE(second.configure(options, kWidth, kHeight).ok());
+  ASSERT_TRUE(second.learn_from(learnt).ok());
+  ASSERT_TRUE(second.write_background(picture.view<uint8_t>()));
+  const Frame loaded = picture.samples();
+  for (size_t i = 0; i < 3 * kPixels; ++i) {
+    ASSERT_EQ(loaded[i] % 16, 8);
+    ASSERT_NEAR(loaded[i], known[i], 8 + 1);
+  }
+}
+
 TEST(DeepEngine, RefusesFramesOfAnotherDepth) {
   Engine engine;
   EngineOptions options = options_of(10, Method::qdmd, 4);
