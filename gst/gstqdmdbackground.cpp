@@ -11,7 +11,8 @@
  *
  * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
  * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in
- * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes.
+ * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes,
+ * twice as many in formats of more than 8 bits.
  *
  * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
  * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"
@@ -197,7 +198,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       "The gst-qdmd authors <gst-qdmd@localhost>");
   for (const auto& [name, direction] :
        {std::pair{"sink", GST_PAD_SINK}, std::pair{"src", GST_PAD_SRC}}) {
-    GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+    GstCaps* caps = gst_caps_from_string(QDMD_CAPS);
     gst_element_class_add_pad_template(element_class,
                                        gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps));
     gst_caps_unref(caps);

@@ -4,11 +4,17 @@
 
 #include "gst/gstqdmdstate.h"
 
-// A pad's caps.
-#define QDMD_FORMATS                                                                          \
-  "{ RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, YV12, NV21, " \
-  "Y42B, "                                                                                    \
-  "NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8 }"
+// A pad's formats, of 8 bits and of more, and its caps: who has a choice and no preference gets 8.
+#define QDMD_FORMATS_OF_8_BITS                                                              \
+  "RGBx, BGRx, xRGB, xBGR, RGBA, BGRA, ARGB, ABGR, RGB, BGR, GBR, I420, NV12, YV12, NV21, " \
+  "Y42B, NV16, YUY2, UYVY, Y444, AYUV, A420, GRAY8"
+#define QDMD_DEEP_FORMATS                                                                  \
+  "I420_10LE, I422_10LE, Y444_10LE, P010_10LE, I420_12LE, I422_12LE, Y444_12LE, P012_LE, " \
+  "Y444_16LE, P016_LE, GRAY16_LE, RGBA64_LE, ARGB64"
+#define QDMD_FORMATS "{ " QDMD_FORMATS_OF_8_BITS ", " QDMD_DEEP_FORMATS " }"
+#define QDMD_CAPS                                       \
+  GST_VIDEO_CAPS_MAKE("{ " QDMD_FORMATS_OF_8_BITS " }") \
+  "; " GST_VIDEO_CAPS_MAKE("{ " QDMD_DEEP_FORMATS " }")
 
 namespace qdmd {
 

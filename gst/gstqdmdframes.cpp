@@ -410,6 +410,7 @@ bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& i
   EngineOptions options = settings.engine;
   options.colours = colours_of(info);
   options.levels = levels_of(info);
+  options.depth = bits_of(info).depth;
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;

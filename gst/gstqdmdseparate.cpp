@@ -434,7 +434,7 @@ static void gst_qdmd_separate_class_init(GstQdmdSeparateClass* klass) {
       "Separates background and foreground of video from a static camera by quaternion dynamic "
       "mode decomposition, into up to four streams at once",
       "The gst-qdmd authors <gst-qdmd@localhost>");
-  GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+  GstCaps* caps = gst_caps_from_string(QDMD_CAPS);
   gst_element_class_add_pad_template(
       element_class, gst_pad_template_new("sink", GST_PAD_SINK, GST_PAD_ALWAYS, caps));
   for (const Kind& kind : kKinds)

@@ -11,8 +11,13 @@
 
 namespace qdmd {
 
-// What black, white and neutral chroma are in video of 8 bits, full or limited range as the caps
-// say. Where they do not say it, Y, U and V are of limited range.
+// How the samples of a format lie in memory.
+inline SampleBits bits_of(const GstVideoInfo& info) {
+  return {GST_VIDEO_INFO_COMP_DEPTH(&info, 0), int(GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0))};
+}
+
+// What black, white and neutral chroma are, in the highest 8 bits, full or limited range as the
+// caps say. Where they do not say it, Y, U and V are of limited range.
 inline Levels levels_of(const GstVideoInfo& info) {
   const bool yuv = GST_VIDEO_INFO_IS_YUV(&info);
   GstVideoColorRange range = info.colorimetry.range;
@@ -23,8 +28,10 @@ inline Levels levels_of(const GstVideoInfo& info) {
   Levels levels;
   for (int c = 0; c < 3; ++c) {
     const int from = GST_VIDEO_INFO_IS_GRAY(&info) ? 0 : c;
-    levels.black[c] = static_cast<uint8_t>(offset[from]);
-    levels.white[c] = static_cast<uint8_t>(offset[from] + (yuv && c > 0 ? 0 : scale[from]));
+    const int low = bits_of(info).low();
+    levels.black[c] = static_cast<uint8_t>(offset[from] >> low);
+    levels.white[c] =
+        static_cast<uint8_t>((offset[from] + (yuv && c > 0 ? 0 : scale[from])) >> low);
   }
   return levels;
 }
@@ -93,6 +100,7 @@ class MappedVideoFrame {
     BasicImageView<Byte> view;
     view.width = GST_VIDEO_FRAME_WIDTH(&frame_);
     view.height = GST_VIDEO_FRAME_HEIGHT(&frame_);
+    view.bits = bits_of(frame_.info);
     const bool alpha = GST_VIDEO_INFO_HAS_ALPHA(&frame_.info);
     const int components = GST_VIDEO_FRAME_N_COMPONENTS(&frame_);
     bool even = true;
@@ -113,7 +121,7 @@ class MappedVideoFrame {
     for (Spacing& own : view.own) own = {};
     view.pixel_stride = first.pixel_stride;
     view.row_stride = first.row_stride;
-    if (first.pixel_stride == 4 && !alpha) {
+    if (first.pixel_stride == 4 && !alpha && !view.bits.is_deep()) {
       int fourth = 0 + 1 + 2 + 3;
       for (int c = 0; c < 3; ++c) fourth -= GST_VIDEO_FRAME_COMP_POFFSET(&frame_, c);
       view.alpha = static_cast<Byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0)) + fourth;

@@ -10,8 +10,8 @@ build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins
   libeigen3-dev libhwy-dev libopencv-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -ugly and -x what
 # the documentation's pipelines and the demo encode and write text with, -opencv the element that
-# tests/bench compares with, -libav the lossless encoder of qdmd-archive, which Open MPI's mpirun
-# starts; gi runs the examples in Python.
+# tests/bench compares with, -libav the lossless encoder of qdmd-archive and what plays H.264 and
+# H.265 of 10 bits, openmpi what starts qdmd-archive; gi runs the examples in Python.
 test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 valgrind
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad

@@ -16,12 +16,13 @@ using Index = Eigen::Index;
 QuaternionMatrixd pixels_of(const SnapshotRange& snapshots) {
   const auto n = static_cast<Index>(snapshots.pixels());
   QuaternionMatrixd x(n, snapshots.size());
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* r = snapshots.plane(t, 0);
-    const uint8_t* g = snapshots.plane(t, 1);
-    const uint8_t* b = snapshots.plane(t, 2);
-    for (Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
-  }
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (Index p = 0; p < n; ++p) {
+      const auto pixel = static_cast<size_t>(p);
+      x.set(p, t,
+            Quaterniond(0.0, snapshots.sample(t, 0, pixel), snapshots.sample(t, 1, pixel),
+                        snapshots.sample(t, 2, pixel)));
+    }
   return x;
 }
 

@@ -51,7 +51,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       std::move(learner),
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
                   &workers_->pool(), &clock_},
-      options.colours, options.steps);
+      options.colours, options.steps, options.levels);
   if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
   background_->learner().set_absorb_frames(absorb_frames_);
@@ -108,6 +108,8 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
   if (frame.width != frames_.width() || frame.height != frames_.height())
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
+  if (frame.bits.depth != options_.depth)
+    return {Status::Code::invalid_options, "configure the engine anew for samples of other depth"};
   const Clock::Span span(clock_, Clock::frames);
   return flushed_if_it_throws([&]() -> Status {
     workers_->follow();
@@ -188,6 +190,7 @@ OutputTask Engine::task_of(Output output) {
   task.model = &background_->model();
   task.output = output;
   task.constant_alpha = 255;
+  task.constant_alpha_low = static_cast<uint8_t>((1 << frames_.low_bits()) - 1);
   return task;
 }
 
@@ -199,6 +202,11 @@ OutputTask Engine::next_task(Output output) {
   for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(slot, c);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
+  if (frames_.low_bits() > 0) {
+    for (int c = 0; c < kChannels; ++c) task.low[c] = frames_.low(slot, c);
+    task.alpha_low = frames_.alpha_low(slot);
+    task.constant_alpha_low = frames_.constant_alpha_low(slot);
+  }
   return task;
 }
 
@@ -234,7 +242,10 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   const Pose pose = next_pose();
   if (pose.is_rest() || stabilize_output_) return;
   const int slot = frames_.slot(frames_.size() - queue_.pending);
-  for (int c = 0; c < kChannels; ++c) task->x[c] = frames_.untouched(slot, c);
+  for (int c = 0; c < kChannels; ++c) {
+    task->x[c] = frames_.untouched(slot, c);
+    if (frames_.low_bits() > 0) task->low[c] = frames_.untouched_low(slot, c);
+  }
   Resampler* const resampler = &stabilizer_->resampler();
   Pool* const pool = workers_->side().idle() ? &workers_->pool() : nullptr;
   if (level) {
@@ -322,7 +333,7 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
     if (masked) decide_next(&task);
-    if (decided_ && !masked) {
+    if (decided_ && !masked && !out.bits.is_deep()) {
       background_->decision().level(0, task.level);
       task.level_stride = background_->decision().level_stride();
     }

@@ -47,7 +47,7 @@ class Engine {
   // Writes a picture of the next frame, which stays the next frame: any number of pictures can be
   // made from one computation. Call only while ready(); `out` has the configured size. `levels` are
   // its black, white and neutral chroma: the configured ones, or, for a mask in another format, the
-  // levels of that format.
+  // levels of that format. Samples have the configured depth, or 8 bits: the highest ones.
   void write(Output output, const Levels& levels, const MutableImageView& out);
   // The mask of the frame that leaves next, of the whole picture, even if a team shares it: 255
   // where foreground, else 0, width * height samples in row order. Good until skip(). Null unless

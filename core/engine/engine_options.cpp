@@ -15,6 +15,7 @@ namespace {
 
 // The most that may share pictures of this size: each has rows of cells.
 int most_members(int width, int height) { return Grid(width, height).rows; }
+
 // More than the sums of a Gram matrix can hold. Bytes of fewer pixels, in any window, are below
 // 2^63.
 bool has_too_many_pixels(int width, int height) {
@@ -56,6 +57,7 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   // They are read until the last of them has left.
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   layout.frame_bytes =
+      (options.depth > 8 ? 2 : 1) *
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, learner.contents());
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
@@ -121,9 +123,11 @@ Status check_team(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
   if (!options.team) return {};
   if (options.mode != Mode::batch || options.stabilize != Stabilize::off ||
-      options.mask_softness > 0)
-    return {Code::invalid_options,
-            "processes share a window in mode=batch with stabilize=off and mask-softness=0 only"};
+      options.mask_softness > 0 || options.low_bits() > 0)
+    return {
+        Code::invalid_options,
+        "processes share a window in mode=batch with stabilize=off and mask-softness=0 only, of "
+        "video of 8 bits"};
   // What an earlier window's background was is not known as far outwards as its frames are.
   if (options.method == Method::robust && options.remembers)
     return {Code::invalid_options,
@@ -162,6 +166,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.mask_softness < 0 || options.mask_softness > kMostSoftness)
     return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
+  if (options.depth < 8 || options.depth > EngineOptions::kMostDepth)
+    return {Code::invalid_options, "a sample has 8 to 16 bits"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};

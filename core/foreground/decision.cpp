@@ -127,7 +127,8 @@ Decision::Shape::Shape(int width_, const Band& band, bool votes)
       reach(votes ? voting_reach(width, band.height()) : 0),
       stride(static_cast<size_t>(width + 2 * margin)) {}
 
-Decision::Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps)
+Decision::Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps,
+                   const Levels& levels)
     : band_(band),
       shape_(width, band, steps.vote),
       steps_(steps),
@@ -146,7 +147,7 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
     for (int rank = 0; rank < band.members(); ++rank) bytes += packed_size(band, rank, width);
     packed_.resize(bytes);
   }
-  if (colours == Colours::yuv) black_[0] = 16, black_[1] = black_[2] = 128;
+  std::copy_n(levels.black, kChannels, black_);
 }
 
 uint64_t Decision::bytes(int width, const Band& band) {

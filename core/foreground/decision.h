@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
 #include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
@@ -48,10 +49,12 @@ struct Comparison {
 // come in the stream's order.
 class Decision {
  public:
-  // Takes all memory. For frames of that width and these colours, and a band of their rows: what it
-  // is given, and what it says, has the rows that are kept; of these the own ones are decided as in
-  // the whole picture where reach() rows are kept around them, and masks are the same everywhere.
-  Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps = {});
+  // Takes all memory. For frames of that width and these colours, in which black is that of
+  // `levels`, and a band of their rows: what it is given, and what it says, has the rows that are
+  // kept; of these the own ones are decided as in the whole picture if reach() rows are kept around
+  // them, and masks are the same everywhere.
+  Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps = {},
+           const Levels& levels = {});
   static uint64_t bytes(int width, const Band& band);
   // What own rows depend on, in rows of the frames and their L.
   static int reach(int width, int height);
@@ -148,7 +151,7 @@ class Decision {
   DecisionSteps steps_;
   Shadows shadows_ = Shadows::background;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
-  uint8_t black_[3] = {0, 0, 0};
+  uint8_t black_[3];
   bool knows_light_;
   MovingTexture texture_;
   PixelNoise noise_;

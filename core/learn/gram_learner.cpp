@@ -21,6 +21,17 @@ constexpr size_t kUnit = BackgroundModel::kSliceUnit;
 // Pixels of all snapshots that are spread at once: they stay in the second-level cache.
 constexpr size_t kRun = 1024;
 
+// Of samples in units of 1 / 2^low_bits levels, in levels. Sensitivity is a ratio.
+void put_in_levels(int low_bits, DmdSummary* summary) {
+  if (low_bits == 0) return;
+  const double unit = 1.0 / (1 << low_bits);
+  summary->rounding_bound *= unit;
+  if (!summary->spectrum) return;
+  auto spectrum = *summary->spectrum;
+  for (SpectrumMode& mode : spectrum) mode.amplitude *= unit;
+  summary->spectrum = std::make_shared<const std::vector<SpectrumMode>>(std::move(spectrum));
+}
+
 }  // namespace
 
 GramLearner::GramLearner(const LearnOptions& options, int width, const Band& band)
@@ -37,11 +48,13 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
   const double seen = pixels_seen();
-  return SlidingGram::bytes(capacity, threads) +
+  const bool deep = options_.low_bits() > 0;
+  return SlidingGram::bytes(capacity, threads, {}, deep ? 2 : 1) +
          (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
-         (models == Models::one ? 1 : 2) *
-             BackgroundModel::bytes(pixels, window_size, pictures, models == Models::two_of_live);
+         (models == Models::one ? 1 : 2) * BackgroundModel::bytes(pixels, window_size, pictures,
+                                                                  models == Models::two_of_live,
+                                                                  deep);
 }
 
 bool GramLearner::may_read_frames(int window_size) const {
@@ -88,15 +101,19 @@ void GramLearner::begin(const LearnerRoom& room) {
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   const int capacity = room.frames->capacity();
-  gram_ = shares_chroma() ? SlidingGram(capacity, room.frames->window().shape(), room.pool)
-                          : SlidingGram(capacity, room.pool);
+  if (options_.low_bits() > 0)
+    gram_ = SlidingGram(capacity, options_.low_bits(), room.pool);
+  else if (shares_chroma())
+    gram_ = SlidingGram(capacity, room.frames->window().shape(), room.pool);
+  else
+    gram_ = SlidingGram(capacity, room.pool);
 }
 
 // What the decomposition sees has samples that pixels share.
 bool GramLearner::shares_chroma() const { return room_.frames->samples().shape().is_shared(); }
 
 SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
-  return snapshots.in(room_.frames->samples());
+  return room_.frames->whole_samples(snapshots);
 }
 
 void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
@@ -136,6 +153,7 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
                               pixels_seen());
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
+    put_in_levels(options_.low_bits(), &decomposed_.dmd);
     background_ = std::move(decomposition.background);
   }
   decomposed_.window_frames = snapshots.size();
@@ -143,7 +161,7 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
   decomposed_.gram_time = products - products_told_;
   decomposed_.solve_time = room_.clock->spent().of(Clock::solving) - before;
   products_told_ = products;
-  snapshots_ = snapshots;
+  snapshots_ = room_.frames->whole(snapshots);
 }
 
 void GramLearner::build(Slice slice, BackgroundModel* model) {

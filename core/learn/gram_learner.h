@@ -15,7 +15,7 @@ class GramLearner : public Learner {
  public:
   GramLearner(const LearnOptions& options, int width, const Band& band);
 
-  FrameContents contents() const override { return {step_, 0}; }
+  FrameContents contents() const override { return {step_, 0, 1, 1, options_.low_bits()}; }
   std::vector<int> sample_steps() const override { return {step_}; }
   bool in_one_piece() const override { return false; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;

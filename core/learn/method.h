@@ -21,7 +21,10 @@ struct LearnOptions {
   int sample_step = 0;
   // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
   bool remembers = true;
+  int depth = 8;  // bits of the frames' samples, 8 to 16
 
+  static constexpr int kMostDepth = 16;
+  int low_bits() const { return depth - 8; }
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
 };
 

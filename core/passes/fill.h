@@ -31,8 +31,9 @@ class WindowMask {
 class Filler {
  public:
   // Runs of up to run() pixels, a multiple of 64: they stay in the second-level cache.
-  explicit Filler(int snapshots);
-  static uint64_t bytes(int snapshots);
+  // deep: for fill_deep(), else for fill().
+  explicit Filler(int snapshots, bool deep = false);
+  static uint64_t bytes(int snapshots, bool deep = false);
   Filler(Filler&&) = default;  // not copied: planes_ points into samples_
   size_t run() const { return run_; }
 
@@ -47,11 +48,24 @@ class Filler {
   const uint8_t* const* fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
                              const WindowMask& mask, const Reference& reference,
                              const uint8_t* reach, size_t first, size_t count);
+  // The same of snapshots with low digits: whole samples, their medians and distances, in units of
+  // the lowest bit. Where there are no others, the middle of the reference's level.
+  const uint16_t* const* fill_deep(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                                   const WindowMask& mask, const Reference& reference,
+                                   const uint8_t* reach, size_t first, size_t count);
 
  private:
+  template <typename T>
+  void list_rows(size_t planes, std::vector<T>* samples, std::vector<const T*>* rows);
+  template <typename Take>
+  void take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                 const WindowMask& mask, size_t first, size_t padded, const Take& take);
+
   size_t run_;
   std::vector<uint8_t> samples_, keep_;
+  std::vector<uint16_t> deep_samples_;
   std::vector<const uint8_t*> planes_;
+  std::vector<const uint16_t*> deep_planes_;
   std::vector<uint16_t> masked_;  // snapshots, of each pixel
 };
 

@@ -44,6 +44,27 @@ std::vector<int> run_clip(const char* output, GstVideoFormat format, int width, 
   return seen;
 }
 
+// Upstream that likes the deepest formats best, as videotestsrc does.
+TEST(Choice, IsOf8BitsWhereNobodyPrefersMore) {
+  for (const char* element : {"qdmdbackground", "qdmdseparate"}) {
+    GstElement* made = gst_element_factory_make(element, nullptr);
+    GstPad* sink = gst_element_get_static_pad(made, "sink");
+    const auto first_of = [&](const char* formats) {
+      GstCaps* filter =
+          gst_caps_from_string((std::string("video/x-raw,format=") + formats).c_str());
+      GstCaps* caps = gst_caps_fixate(gst_pad_query_caps(sink, filter));
+      const std::string first = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
+      gst_caps_unref(caps);
+      gst_caps_unref(filter);
+      return first;
+    };
+    EXPECT_EQ(first_of("{ARGB64,P010_10LE,RGBA,NV12}"), "RGBA") << element;
+    EXPECT_EQ(first_of("{ARGB64,P010_10LE}"), "ARGB64") << element;
+    gst_object_unref(sink);
+    gst_object_unref(made);
+  }
+}
+
 class Formats : public testing::TestWithParam<const char*> {};
 
 TEST_P(Formats, AllGiveTheSamePicturesAtAnyWidthAndStride) {

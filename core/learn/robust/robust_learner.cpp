@@ -116,7 +116,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          GridFrames::bytes(grid_, static_cast<int>(looks)) +
                          std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
-  const uint64_t filling = workers * Filler::bytes(window_size);
+  const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
   return kept + made + scene +
          std::max({start, masks, scene,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
@@ -249,6 +249,39 @@ void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, c
   calm_ = 0;
   model->freeze_but_for_light(frame.t);
   replace(cells, frame.around.every(2), light, model);
+  if (options_.low_bits() > 0)
+    replace_deep(cells, room_.frames->whole(frame.around.every(2)), light, model);
+}
+
+// The same of whole samples.
+void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRange& frames,
+                                 const Gain& light, BackgroundModel* model) const {
+  const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
+  const double unit = 1.0 / (1 << frames.low_bits());
+  for (int cell : cells) {
+    const int row = cell / grid_.cols, col = cell % grid_.cols;
+    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
+      for (int x = grid_.left(col); x < grid_.left(col + 1); ++x) {
+        const auto p =
+            static_cast<size_t>(y) * static_cast<size_t>(grid_.width) + static_cast<size_t>(x);
+        float level[kChannels];
+        for (int c = 0; c < kChannels; ++c) {
+          // In order: there are a few.
+          double samples[kMendingFrames];
+          for (int t = 0; t < frames.size(); ++t) {
+            const double sample = frames.sample(t, c, p);
+            int at = t;
+            for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
+            samples[at] = sample;
+          }
+          const double middle = (samples[(count - 1) / 2] + samples[half]) / 2;
+          const auto channel = static_cast<size_t>(c);
+          level[channel] = static_cast<float>(middle * unit / static_cast<double>(light[channel]));
+        }
+        const float* const out[3] = {&level[0], &level[1], &level[2]};
+        model->replace(p, 1, out);
+      }
+  }
 }
 
 // The median of the frames in place of the background of these cells.
@@ -420,12 +453,19 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
 }
 
 // The modes' pictures from filled frames, run by run.
-void RobustLearner::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
+void RobustLearner::combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model) {
+  const SnapshotRange whole = room_.frames->whole(snapshots);
   std::vector<Filler> fillers;
-  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
+  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size(), deep);
   const size_t run = fillers[0].run();
   room_.pool->run((pixels() + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, pixels() - first);
+    if (deep) {
+      model->build_from(
+          fillers[worker].fill_deep(whole, gains_, mask_, reference_, reach_.data(), first, count),
+          first, count);
+      return;
+    }
     model->build_from(
         fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
         first, count);
@@ -497,10 +537,14 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       const Decomposition decomposition = decompose_filled(snapshots);
       facts_.dmd = decomposition.summary;
       divide_time(stride_, &facts_.dmd);
-      model->begin(snapshots, decomposition.background, true);
+      const bool deep = options_.low_bits() > 0 && iteration + 1 == options_.iterations;
+      // Where all is so dark that its highest bits are 0, they have no mode.
+      const bool dark = deep && facts_.dmd.background_modes == 0;
+      model->begin(snapshots, dark ? mean_of_frames(snapshots.size()) : decomposition.background,
+                   true);
       model->set_stride(stride_);
-      model->make_steady();
-      combine(snapshots, model);
+      if (!deep) model->make_steady();
+      combine(snapshots, deep, model);
       take_reference(model, snapshots_->size() / 2);
     }
     end(model);

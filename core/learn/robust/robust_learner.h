@@ -44,6 +44,8 @@ struct RobustParameters {
 //   repeat   what differs from the picture is foreground (find_mask) and becomes background
 //            (Filler); Q-DMD of the filled window, of rank 1 unless another is asked for, with
 //            amplitudes fitted to all frames, is the next background
+// Of samples of more than 8 bits the start, masks and inner products see the highest eight; what is
+// filled and combined last has all bits.
 // Global changes of light are divided out before and put back in L(t). Inner products are taken
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
@@ -54,7 +56,9 @@ class RobustLearner : public Learner {
   // Pixels of a band's background depend on rows so far from them.
   static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
 
-  FrameContents contents() const override { return {1, parameters_.cells_along}; }
+  FrameContents contents() const override {
+    return {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+  }
   std::vector<int> sample_steps() const override;
   bool in_one_piece() const override { return true; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
@@ -101,7 +105,7 @@ class RobustLearner : public Learner {
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
-  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
+  void combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames();
   void keep_some();
@@ -110,6 +114,8 @@ class RobustLearner : public Learner {
   void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                BackgroundModel* model);
   bool is_calm() const;
+  void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
+                    BackgroundModel* model) const;
   void end(BackgroundModel* model);
 
   // Hops that are left out between two solves, at most.
