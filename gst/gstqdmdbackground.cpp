@@ -57,7 +57,7 @@ class BackgroundState : public qdmd::State {
     return its.output == Output::mask || its.output == Output::cutout;
   }
   GstFlowReturn make_pictures(GstBuffer* shell, const qdmd::Settings& its,
-                              qdmd::Pictures* pictures) override {
+                              qdmd::OutputPictures* pictures) override {
     GstBuffer* made = nullptr;
     const GstFlowReturn flow =
         GST_BASE_TRANSFORM_GET_CLASS(trans_)->prepare_output_buffer(trans_, shell, &made);
@@ -66,9 +66,9 @@ class BackgroundState : public qdmd::State {
       pictures->add({its.output, &GST_VIDEO_FILTER(trans_)->out_info, std::move(buffer)});
     return flow;
   }
-  GstFlowReturn send(qdmd::Pictures* pictures) override {
+  GstFlowReturn send(qdmd::OutputPictures* pictures) override {
     GstFlowReturn flow = GST_FLOW_OK;
-    for (qdmd::Picture& picture : *pictures)
+    for (qdmd::OutputPicture& picture : *pictures)
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(trans_), picture.buffer.release());
     return flow;
   }
@@ -113,7 +113,7 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
 }
 
 static GstFlowReturn gst_qdmd_background_generate_output(GstBaseTransform* trans, GstBuffer** out) {
-  qdmd::Pictures pictures;
+  qdmd::OutputPictures pictures;
   const GstFlowReturn flow = qdmd::next_pictures(GST_ELEMENT(trans), &pictures);
   *out = flow == GST_FLOW_OK && !pictures.empty() ? pictures.begin()->buffer.release() : nullptr;
   return flow;

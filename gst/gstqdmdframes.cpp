@@ -249,7 +249,7 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
   }
 }
 
-GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
+GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   State* state = state_of(self);
   pictures->clear();
   if (!state->engine.ready()) return GST_FLOW_OK;
@@ -269,9 +269,9 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
   const std::vector<Region>* regions = nullptr;
   Pose pose;
   {
-    std::optional<MappedVideoFrame> frames[Pictures::kMost];
+    std::optional<MappedVideoFrame> frames[OutputPictures::kMost];
     size_t mapped = 0;
-    for (const Picture& picture : *pictures) {
+    for (const OutputPicture& picture : *pictures) {
       auto& frame = frames[mapped++];
       frame.emplace(picture.info, picture.buffer.get(), GST_MAP_WRITE);
       if (*frame) continue;
@@ -289,7 +289,7 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
       pose = engine.next_pose();
       if (settings.regions && mapped > 0) regions = &next_regions(self, settings.regions_min_area);
       size_t next = 0;
-      for (const Picture& picture : *pictures)
+      for (const OutputPicture& picture : *pictures)
         engine.write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
       engine.skip();
       note_solve(self, shell.get());
@@ -301,7 +301,7 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
     }
   }
   if (regions)
-    for (const Picture& picture : *pictures) attach(picture.buffer.get(), *regions);
+    for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
   publish_report(self, 0, 1);
   tell_of_solve(self, shell.get());
   tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
@@ -324,7 +324,7 @@ GstFlowReturn drain(GstElement* self) {
   }
   tell_of_solve(self, nullptr);
   while (state->goes_on(flow) && state->engine.ready()) {
-    Pictures pictures;
+    OutputPictures pictures;
     flow = next_pictures(self, &pictures);
     if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }

@@ -17,7 +17,7 @@ enum class Colours : uint8_t { rgb, yuv, grey };
 // width * height samples.
 struct Learnt {
   // Of method=robust: what a window leaves to the next.
-  struct Earlier {
+  struct EarlierWindow {
     std::vector<uint8_t> level[kChannels], spread;
     // By the cells of a grid.
     int rows = 0, cols = 0;
@@ -29,7 +29,7 @@ struct Learnt {
   std::vector<uint8_t> level[kChannels];  // L as it was shown
   std::vector<uint8_t> limits;            // BackgroundModel::limits(), or empty
   double noise = 0;                       // ForegroundStatistics::noise
-  std::optional<Earlier> earlier;
+  std::optional<EarlierWindow> earlier;
 };
 
 }  // namespace qdmd

@@ -294,7 +294,7 @@ void Filler::take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& 
 }
 
 const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                                   const WindowMask& mask, const Reference& reference,
+                                   const WindowMask& mask, const ReferencePicture& reference,
                                    const uint8_t* reach, size_t first, size_t count) {
   const auto m = static_cast<size_t>(snapshots.size());
   const size_t padded = round_up(count);
@@ -318,7 +318,7 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
 
 const uint16_t* const* Filler::fill_deep(const SnapshotRange& snapshots,
                                          const std::vector<Gain>& gains, const WindowMask& mask,
-                                         const Reference& reference, const uint8_t* reach,
+                                         const ReferencePicture& reference, const uint8_t* reach,
                                          size_t first, size_t count) {
   const auto m = static_cast<size_t>(snapshots.size());
   const size_t padded = round_up(count);
@@ -343,12 +343,12 @@ const uint16_t* const* Filler::fill_deep(const SnapshotRange& snapshots,
   return deep_planes_.data();
 }
 
-void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
   fill_samples(reference, bits, x, gain, reach, {0, reference.height, step}, out);
 }
 
-void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]) {
   const bool lit = is_lit(gain);

@@ -46,12 +46,12 @@ class Filler {
   // Returns a plane of samples for each channel of each snapshot, readable up to the next multiple
   // of 64; they are good until the next call.
   const uint8_t* const* fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                             const WindowMask& mask, const Reference& reference,
+                             const WindowMask& mask, const ReferencePicture& reference,
                              const uint8_t* reach, size_t first, size_t count);
   // The same of snapshots with low digits: whole samples, their medians and distances, in units of
   // the lowest bit. Where there are no others, the middle of the reference's level.
   const uint16_t* const* fill_deep(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                                   const WindowMask& mask, const Reference& reference,
+                                   const WindowMask& mask, const ReferencePicture& reference,
                                    const uint8_t* reach, size_t first, size_t count);
 
  private:
@@ -72,10 +72,10 @@ class Filler {
 // Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,
 // drawn to that as Filler does to the median: for inner products. out: ceil(width / step) *
 // ceil(height / step) samples a channel.
-void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]);
 // The same of some rows.
-void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]);
 

@@ -141,7 +141,7 @@ size_t mask_scratch_bytes(int width, int height) {
   return bytes + bytes % 2;
 }
 
-void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
                uint8_t* bits, uint8_t* scratch) noexcept {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
@@ -188,7 +188,7 @@ void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain
   HWY_DYNAMIC_DISPATCH(pack_bits)(mask, pixels, bits);
 }
 
-GainSums gain_sums(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+GainSums gain_sums(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
                    const SampledRows& rows) {
   int64_t product[kChannels] = {}, square[kChannels] = {}, fit = 0, seen = 0;
   for (int row = rows.first; row < rows.end; row += rows.step)
@@ -227,7 +227,7 @@ bool refine_gain(const GainSums& sums, Gain* gain) {
   return true;
 }
 
-Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
                  int step) {
   Gain refined = gain;
   for (int round = 0; round < kGainRounds; ++round)

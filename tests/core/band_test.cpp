@@ -72,12 +72,12 @@ struct Case {
 };
 
 // Rows first .. first + count - 1.
-std::vector<uint8_t> rows_of(Picture& picture, int first, int count) {
+std::vector<uint8_t> rows_of(PackedPicture& picture, int first, int count) {
   const auto begin = picture.bytes.begin() + first * picture.row_stride;
   return {begin, begin + count * picture.row_stride};
 }
 
-Picture kept_rows(const Street& street, int t, const Band& band) {
+PackedPicture kept_rows(const Street& street, int t, const Band& band) {
   const std::vector<uint8_t> planes = street.frame(t);
   const auto row = static_cast<size_t>(street.width);
   const size_t pixels = row * static_cast<size_t>(street.height),
@@ -88,7 +88,7 @@ Picture kept_rows(const Street& street, int t, const Band& band) {
                        static_cast<ptrdiff_t>(c * pixels + row * static_cast<size_t>(band.first()));
     part.insert(part.end(), begin, begin + static_cast<ptrdiff_t>(kept));
   }
-  Picture picture(street.width, band.rows());
+  PackedPicture picture(street.width, band.rows());
   picture.fill(part);
   return picture;
 }
@@ -105,7 +105,7 @@ Results run(const Case& c, Team* team) {
   engine.set_ignored(c.ignored);
   engine.set_shadows(c.shadows);
   const Band& band = engine.band();
-  Picture out(c.street.width, band.rows());
+  PackedPicture out(c.street.width, band.rows());
   uint64_t solves = 0;
   const auto take = [&] {
     while (engine.ready()) {
@@ -272,7 +272,7 @@ TEST(Band, BeginsAnewLikeAnotherStream) {
   for (int window = 0; window < 3; ++window) {
     Engine engine;
     ASSERT_TRUE(engine.configure(c.options, 97, 91).ok());
-    Picture out(97, 91);
+    PackedPicture out(97, 91);
     for (int t = 0; t < 12; ++t)
       ASSERT_TRUE(engine.push(kept_rows(c.street, 12 * window + t, engine.band()).in()).ok());
     ASSERT_TRUE(engine.drain().ok());

@@ -386,7 +386,7 @@ std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode,
   Engine engine;
   engine.set_masks_expected(masks_expected);
   EXPECT_TRUE(engine.configure(options, frames[0].width, frames[0].height).ok());
-  Picture picture(frames[0].width, frames[0].height, 3, false, 0);
+  PackedPicture picture(frames[0].width, frames[0].height, 3, false, 0);
   std::vector<double> shares;
   const auto pop = [&] {
     while (engine.ready()) {

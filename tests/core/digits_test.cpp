@@ -253,7 +253,7 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
         for (size_t pixels : {size_t{1}, size_t{130}}) {
           DeepWindow window(snapshots, pixels, low_bits);
           const int most = (256 << low_bits) - 1;
-          Reference reference;
+          ReferencePicture reference;
           reference.width = static_cast<int>(pixels), reference.height = 1;
           for (auto& level : reference.level) {
             level.resize(pixels);

@@ -159,13 +159,13 @@ TEST(Engine, ConfigureStartsAfresh) {
 
 TEST(EngineStatus, BeforeConfigure) {
   Engine engine;
-  Picture picture(2, 2);
+  PackedPicture picture(2, 2);
   EXPECT_EQ(engine.push(picture.in()).code, Status::Code::not_configured);
   EXPECT_EQ(engine.drain().code, Status::Code::not_configured);
   EXPECT_FALSE(engine.ready());
   engine.flush();
   engine.pop(Output::background, picture.out());
-  EXPECT_EQ(picture.bytes, Picture(2, 2).bytes) << "nothing to pop, nothing written";
+  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing to pop, nothing written";
 }
 
 TEST(EngineStatus, PushWhileFramesAreWaiting) {
@@ -199,7 +199,7 @@ Status::Code configured(const std::function<void(EngineOptions&)>& change, int w
 
 TEST(EngineStatus, FramesOfAnotherSize) {
   Strip strip(8, window_of(3));
-  Picture wider(9, 1), higher(8, 2);
+  PackedPicture wider(9, 1), higher(8, 2);
   EXPECT_EQ(strip.engine.push(wider.in()).code, Status::Code::invalid_options);
   EXPECT_EQ(strip.engine.push(higher.in()).code, Status::Code::invalid_options);
   EXPECT_EQ(strip.engine.pending(), 0);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kWidth = 37, kHeight = 23;
 
-Picture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1) {
-  Picture picture(kWidth, kHeight, with_alpha ? 4 : 3, with_alpha, 5);
+PackedPicture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1) {
+  PackedPicture picture(kWidth, kHeight, with_alpha ? 4 : 3, with_alpha, 5);
   for (uint8_t& byte : picture.bytes) byte = static_cast<uint8_t>(rng() >> 7);
   if (constant_alpha >= 0)
     for (size_t p = 0; p < picture.pixels(); ++p)
@@ -21,7 +21,7 @@ Picture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1
 }
 
 // Everything that the store says of a frame, by its definition.
-void expect_frame(const FrameStore& store, int index, Picture& picture, int step) {
+void expect_frame(const FrameStore& store, int index, PackedPicture& picture, int step) {
   const int slot = store.slot(index);
   const auto at = [&](size_t c, int x, int y) {
     return picture.at(c, static_cast<size_t>(y) * kWidth + static_cast<size_t>(x));
@@ -55,7 +55,7 @@ TEST(FrameStore, HasAllThatBelongsToTheNewestFrames) {
   for (int step : {1, 3, 64})
     for (int along : {0, 1, 7, 23}) {
       FrameStore store(4, kWidth, kHeight, {step, along});
-      std::deque<Picture> held;
+      std::deque<PackedPicture> held;
       for (int t = 0; t < 11; ++t) {
         held.push_back(random_frame(rng, false));
         if (held.size() > 4) held.pop_front();
@@ -77,12 +77,12 @@ TEST(FrameStore, KeepsAlphaOnceItVaries) {
   const uint64_t without = store.bytes();
   EXPECT_EQ(without, FrameStore::bytes(3, kWidth, kHeight, {}));
   EXPECT_EQ(store.bytes_with_alpha(), without + 3 * kWidth * kHeight);
-  Picture constant = random_frame(rng, true, 77);
+  PackedPicture constant = random_frame(rng, true, 77);
   ASSERT_TRUE(store.append(constant.in()));
   EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
   EXPECT_EQ(store.constant_alpha(store.slot(0)), 77);
   EXPECT_EQ(store.bytes(), without);
-  Picture varying = random_frame(rng, true);
+  PackedPicture varying = random_frame(rng, true);
   ASSERT_TRUE(store.append(varying.in()));
   EXPECT_EQ(store.bytes(), store.bytes_with_alpha());
   EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
@@ -97,7 +97,7 @@ TEST(FrameStore, KeepsAlphaOnceItVaries) {
 TEST(FrameStore, RefusesAlphaForWhichThereIsNoRoom) {
   std::mt19937 rng(403);
   const uint64_t needed = FrameStore::bytes(3, kWidth, kHeight, {}) + 3 * kWidth * kHeight;
-  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  PackedPicture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
   for (uint64_t most : {needed - 1, needed}) {
     FrameStore store(3, kWidth, kHeight, {}, most);
     EXPECT_TRUE(store.append(constant.in()));
@@ -203,7 +203,7 @@ TEST(EngineMemory, OfAlphaThatVaries) {
   options.window_size = 5;
   const uint64_t without = layout_of(options, kWidth, kHeight).bytes,
                  with = without + 5 * kWidth * kHeight;
-  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  PackedPicture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
   for (uint64_t most : {without, with - 1, with}) {
     options.max_memory = most;
     Engine engine;

@@ -58,17 +58,17 @@ constexpr Trial kTrials[] = {
     {"live-qdmd", Mode::live, Method::qdmd, Output::foreground},
 };
 
-std::vector<Picture> footage(const char* text) {
+std::vector<PackedPicture> footage(const char* text) {
   scene::SceneOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.seed = 25;
   options.frames_per_second = 5;  // things take their time
   scene::Scene scene(options, text);
-  std::vector<Picture> frames;
+  std::vector<PackedPicture> frames;
   for (int t = 0; t < kFrames; ++t) {
     scene.render(t, scene::kFrame);
-    Picture picture(kWidth, kHeight, 3);
+    PackedPicture picture(kWidth, kHeight, 3);
     std::copy_n(scene.frame().samples.begin(), picture.bytes.size(), picture.bytes.begin());
     frames.push_back(std::move(picture));
   }
@@ -76,7 +76,7 @@ std::vector<Picture> footage(const char* text) {
 }
 
 // All that leaves, one picture after the other.
-std::vector<uint8_t> output_of(std::vector<Picture> frames, const Trial& trial, int threads) {
+std::vector<uint8_t> output_of(std::vector<PackedPicture> frames, const Trial& trial, int threads) {
   EngineOptions options;
   options.mode = trial.mode;
   options.method = trial.method;
@@ -90,12 +90,12 @@ std::vector<uint8_t> output_of(std::vector<Picture> frames, const Trial& trial, 
   std::vector<uint8_t> all;
   const auto take = [&] {
     while (engine.ready()) {
-      Picture out(kWidth, kHeight, 3);
+      PackedPicture out(kWidth, kHeight, 3);
       engine.pop(trial.output, out.out());
       all.insert(all.end(), out.bytes.begin(), out.bytes.end());
     }
   };
-  for (Picture& frame : frames) {
+  for (PackedPicture& frame : frames) {
     EXPECT_TRUE(engine.push(frame.in()).ok());
     take();
   }
@@ -110,9 +110,9 @@ std::string hash_of(const std::vector<uint8_t>& bytes) {
   return hash.text();
 }
 
-std::string frames_hash(const std::vector<Picture>& frames) {
+std::string frames_hash(const std::vector<PackedPicture>& frames) {
   Hash hash;
-  for (const Picture& frame : frames) hash.add(frame.bytes);
+  for (const PackedPicture& frame : frames) hash.add(frame.bytes);
   return hash.text();
 }
 

@@ -56,8 +56,8 @@ std::string describe(const Case& c) {
 }
 
 // The same picture in whole samples, whose low bits are noise.
-Picture deepened(const Picture& from, int depth) {
-  Picture to(from.width, from.height, 2 * from.bytes_per_pixel);
+PackedPicture deepened(const PackedPicture& from, int depth) {
+  PackedPicture to(from.width, from.height, 2 * from.bytes_per_pixel);
   std::minstd_rand random(7);
   for (size_t i = 0; i < from.bytes.size(); ++i) {
     const auto sample =
@@ -68,7 +68,7 @@ Picture deepened(const Picture& from, int depth) {
   return to;
 }
 template <typename Byte>
-BasicImageView<Byte> deep_view(Picture& picture, const Case& c) {
+BasicImageView<Byte> deep_view(PackedPicture& picture, const Case& c) {
   auto view = picture.view<Byte>();
   for (int channel = 0; channel < 3; ++channel)
     view.channel[channel] = picture.bytes.data() + 2 * channel;
@@ -79,7 +79,7 @@ BasicImageView<Byte> deep_view(Picture& picture, const Case& c) {
 
 // A light that goes up and down, something that moves, and noise, which makes the frames linearly
 // independent: all that a solve may need memory for.
-void paint(int t, Alpha alpha, Picture* picture) {
+void paint(int t, Alpha alpha, PackedPicture* picture) {
   std::minstd_rand random(static_cast<unsigned>(t) + 1);
   for (int y = 0; y < picture->height; ++y)
     for (int x = 0; x < picture->width; ++x) {
@@ -97,7 +97,7 @@ void paint(int t, Alpha alpha, Picture* picture) {
 }
 
 // Another scene: bars, where there are columns else.
-void turn(Picture* picture) {
+void turn(PackedPicture* picture) {
   for (size_t p = 0; p < picture->pixels(); ++p) {
     const size_t y = p / static_cast<size_t>(picture->width);
     for (size_t c = 0; c < 3; ++c)
@@ -109,10 +109,10 @@ void turn(Picture* picture) {
 // what else can be asked. Returns the bytes that the engine says it takes.
 double run(const Case& c) {
   const allocator::Unseen unseen;
-  Picture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
+  PackedPicture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
   const auto pixels = picture.pixels();
   std::vector<uint8_t> mask(pixels), residual(pixels);
-  Picture deep = deepened(picture, c.depth);
+  PackedPicture deep = deepened(picture, c.depth);
   const auto see = [](auto work) {
     const allocator::SeenAgain again;
     work();
@@ -274,7 +274,7 @@ TEST(Memory, OfSoftMasksCountsOnceThereAreAny) {
   const uint64_t before = engine.bytes();
   engine.set_mask_softness(2);
   EXPECT_EQ(engine.bytes(), before);
-  Picture picture(c.width, c.height, 3);
+  PackedPicture picture(c.width, c.height, 3);
   for (int t = 0; t < 2; ++t) {
     paint(t, Alpha::none, &picture);
     ASSERT_TRUE(engine.push(picture.in()).ok());

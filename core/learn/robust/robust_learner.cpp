@@ -145,7 +145,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
   light_scratch_ = LightScratch(grid_.cells());
-  earlier_ = Earlier(grid_);
+  earlier_ = EarlierWindow(grid_);
   looks_ = StandingLooks(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);

@@ -9,7 +9,7 @@
 #include "core/gram/gram.h"
 #include "core/learn/learner.h"
 #include "core/learn/robust/absorbed.h"
-#include "core/learn/robust/earlier.h"
+#include "core/learn/robust/earlier_window.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/scene_watch.h"
@@ -130,7 +130,7 @@ class RobustLearner : public Learner {
   GridFrames background_cells_;  // of the published and the newest solve, in unit light
   int published_ = 0;
   LightScratch light_scratch_;  // of light()
-  Earlier earlier_;
+  EarlierWindow earlier_;
   FrameMemory memory_;
   StandingLooks looks_;  // of the frames that were compared with the background in use
   int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
@@ -150,7 +150,7 @@ class RobustLearner : public Learner {
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
   StableFrames stable_;
-  Reference reference_;
+  ReferencePicture reference_;
   std::vector<uint8_t> spread_;  // quarters of a level, mean of 5 x 5
   std::vector<uint8_t> reach_;
   std::vector<Gain> gains_;  // of the snapshots
