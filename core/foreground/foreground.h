@@ -47,17 +47,17 @@ struct OutputTask {
   const uint8_t* shaded;
   const uint8_t* alpha;    // the frame's own samples in row order, or null where all are
   uint8_t constant_alpha;  // this
-  // Of samples of more than 8 bits what is below the highest 8, of x and of alpha; else nulls.
-  const uint8_t* low[3] = {nullptr, nullptr, nullptr};
-  const uint8_t* alpha_low = nullptr;
-  uint8_t constant_alpha_low = 0;
-  bool soft = false;  // the mask
+  bool soft = false;       // the mask
   // Samples of black.
   uint8_t black[3] = {0, 0, 0};
   // L at that time, if it is already computed, in rows that are `level_stride` samples apart; or
   // nulls.
   const uint8_t* level[3] = {nullptr, nullptr, nullptr};
   size_t level_stride = 0;
+  // Of samples of more than 8 bits what is below the highest 8, of x and of alpha; else nulls.
+  const uint8_t* low[3] = {nullptr, nullptr, nullptr};
+  const uint8_t* alpha_low = nullptr;
+  uint8_t constant_alpha_low = 0;
 
   // L of pixels left .. left + count - 1 of a row that is `width` pixels wide. It is computed into
   // `room` unless `level` has it.
