@@ -2,6 +2,7 @@
 # Puts the figures of docs/reliability.md anew, from the logs of runs that took hours:
 #
 #   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log
+#   build/tests/fuzz/fuzz-TARGET --random N --seed 77     a line each, by hand, in build/random.log
 #   build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
 #   tests/coverage.sh                                     leaves build-coverage/coverage.txt
