@@ -138,7 +138,8 @@ class EngineTrial {
         // What a solve beside the frames met comes out with a later call.
         QDMD_DEMAND(failed_);
         // What waited is gone, and the engine goes on; or it is not configured.
-        if (!kept_) waiting_ = 0;
+        // Where there was no memory for the sentence of a refusal, all is as it was.
+        if (!kept_ && engine_.pending() != waiting_) waiting_ = 0;
         kept_ = false;
       }
       if (failing) {
