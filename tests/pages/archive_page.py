@@ -128,7 +128,7 @@ def bytes_table(reports):
     for step in steps:
         most = [max(report['bytes-received-a-frame'][step]) for report in reports]
         rows.append([step, *(bytes_text(count) for count in most)])
-    return page.table(['bytes that a process takes in, a frame',
+    return page.table([f'bytes that a process takes in, a frame; window of {FRAMES} frames',
                        *(f'{report["processes"]} processes' for report in reports)], rows)
 
 
@@ -141,7 +141,7 @@ def memory_table(reports, bare):
         rows.append([str(report['processes']), f'{max(most):.3f}',
                      f'{1 / report["processes"] + 0.1:.3f}',
                      f'{max(without["of-process"]["most-memory"]) / 2**20:.0f} MiB'])
-    return page.table(['processes', 'most memory of one for its window, of the whole window',
+    return page.table(['processes', f'most memory of one for its window of {FRAMES} frames, of the whole window',
                        'promised', 'beside that (decoding, one frame\'s pictures)'], rows)
 
 
