@@ -301,6 +301,12 @@ class Job {
     add("seconds-pictures", pictures_);
     add("seconds-encoding", encoding_);
     add("seconds-talking", team_ ? team_->seconds() : 0);
+    const auto in_seconds = [](const timeval& time) {
+      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
+    // Of all threads, but for what is spent on waiting for others.
+    add("processor-seconds", in_seconds(usage.ru_utime) + in_seconds(usage.ru_stime) -
+                                 (team_ ? team_->processor_seconds() : 0));
     add("most-memory", static_cast<double>(usage.ru_maxrss) * 1024);
     add("rows", engine_.configured() ? engine_.band().own_rows() : 0);
     add("rows-kept", engine_.configured() ? engine_.band().rows() : 0);

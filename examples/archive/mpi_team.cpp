@@ -1,6 +1,7 @@
 #include "examples/archive/mpi_team.h"
 
 #include <mpi.h>
+#include <time.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -29,14 +30,24 @@ const char* name_of(Traffic traffic) {
 // One call: counts what it brings, and the time that it takes.
 class MpiTeam::Call {
  public:
-  Call(MpiTeam* team, Traffic traffic, size_t bytes) : team_(team), start_(MPI_Wtime()) {
+  Call(MpiTeam* team, Traffic traffic, size_t bytes)
+      : team_(team), start_(MPI_Wtime()), processor_start_(processor_time()) {
     if (team->size_ > 1) team->received_[static_cast<size_t>(traffic)] += bytes;
   }
-  ~Call() { team_->seconds_ += MPI_Wtime() - start_; }
+  ~Call() {
+    team_->seconds_ += MPI_Wtime() - start_;
+    team_->processor_seconds_ += processor_time() - processor_start_;
+  }
 
  private:
+  static double processor_time() {
+    timespec time = {};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
   MpiTeam* team_;
-  double start_;
+  double start_, processor_start_;
 };
 
 bool MpiTeam::is_job() {

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Puts what qdmd-archive takes in time, memory and bytes into docs/archive.md anew, and the model that
-# follows from it. Takes some ten minutes, 3 GB of memory and 1 GB below build/.
+# follows from it. Takes some fifteen minutes of a machine that does nothing else, and 5 GB of memory.
 #
 #   tests/pages/archive.sh [PAGE]      PAGE: another copy of docs/archive.md
+#   QDMD_ARCHIVE_FRAMES=200 QDMD_ARCHIVE_TURNS=1   less of both
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 find_sequences
