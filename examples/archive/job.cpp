@@ -113,6 +113,14 @@ class Job {
 
   void configure() {
     const RecordingInfo& info = reader_.info();
+    if (team_) {
+      int64_t first[] = {info.width, info.height};
+      team_->tell(first);
+      if (team_->agree(first[0] != info.width || first[1] != info.height) != 0)
+        throw std::runtime_error("processes read frames of different sizes, this one of " +
+                                 std::to_string(info.width) + "x" + std::to_string(info.height) +
+                                 ": do all machines have the same files?");
+    }
     engine_options_.frame_rate = 0;
     const Status status = engine_.configure(engine_options_, info.width, info.height);
     if (!status.ok()) throw std::invalid_argument(status.message);

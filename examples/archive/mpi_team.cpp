@@ -4,9 +4,11 @@
 #include <time.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <iterator>
 #include <stdexcept>
+#include <thread>
 
 namespace qdmd::archive {
 namespace {
@@ -70,6 +72,8 @@ MpiTeam::MpiTeam(int* argc, char*** argv) {
 MpiTeam::~MpiTeam() { MPI_Finalize(); }
 
 void MpiTeam::abort() {
+  // What starters have not forwarded yet of what was said, they drop.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   MPI_Abort(MPI_COMM_WORLD, 1);
   std::_Exit(1);
 }

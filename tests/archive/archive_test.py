@@ -327,7 +327,7 @@ def failing_process(folder):
         done = subprocess.run([mpirun, '-q', *JOB, '-n', '1', archive, str(first), *words, ':',
                                '-n', '1', archive, str(second), *words],
                               cwd=folder, capture_output=True, text=True, timeout=60)
-        assert done.returncode != 0, done.stdout
+        assert done.returncode != 0, f'it ended well: {done.stdout}{done.stderr}'
         return done.stderr
 
     clip = folder / 'long.mkv'
