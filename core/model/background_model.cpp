@@ -55,7 +55,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   model_ = TemporalModel(model);
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
-  largest_ = 255 * basis_.cwiseAbs().rowwise().sum();
+  largest_ = Eigen::VectorXd(255 * basis_.cwiseAbs().rowwise().sum());
   frozen_ = steady_ = false;
   change();
   stride_ = 1;
@@ -148,7 +148,8 @@ void BackgroundModel::take_weights(const float* weights, size_t count) {
 void BackgroundModel::use_steady_weights(double t) {
   const double middle = (std::floor(t / kSteadyFrames) + 0.5) * kSteadyFrames;
   model_.weights(middle / stride_, &steady_weights_);
-  const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs() * largest_;
+  // Lazy products take no memory.
+  const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs().lazyProduct(largest_);
   if (moved.maxCoeff() < kSteadyLevels) time_weights_ = steady_weights_;
 }
 
@@ -177,9 +178,11 @@ void BackgroundModel::set_time(double t) {
     change();
     return;
   }
-  // In the order of weights_.
-  single_weights_ = time_weights_.transpose().cast<float>();
-  take_weights(single_weights_.data(), static_cast<size_t>(single_weights_.size()));
+  const auto pictures = static_cast<Eigen::Index>(picture_count());
+  single_weights_.resize(kChannels * picture_count());
+  Eigen::Map<Eigen::MatrixXf>(single_weights_.data(), pictures, kChannels) =
+      time_weights_.transpose().cast<float>();
+  take_weights(single_weights_.data(), single_weights_.size());
 }
 
 void BackgroundModel::combine_directly(size_t first, size_t count, float* const* out) const {

@@ -128,8 +128,8 @@ class BackgroundModel {
   TemporalModel model_;
   Eigen::MatrixXd basis_, time_weights_, direct_weights_;
   Eigen::MatrixXd steady_weights_;
-  Eigen::MatrixXf single_weights_;  // K x 3
-  Eigen::VectorXd largest_;         // that a picture has at a pixel, in levels: bounds
+  std::vector<float> single_weights_;  // of one time, as weights_
+  Eigen::VectorXd largest_;            // that a picture has at a pixel, in levels: bounds
   bool direct_ = false, frozen_ = false, steady_ = false;
   uint64_t picture_ = 0;
   int stride_ = 1, low_bits_ = 0;
