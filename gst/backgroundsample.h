@@ -21,7 +21,7 @@ class BackgroundSample {
   // The engine is about to forget its background: the picture of it stays. After an error, which
   // makes it forget at once, the picture is the last that somebody asked for.
   void keep(Engine& engine) {
-    SamplePtr(get(engine));
+    const SamplePtr made(get(engine));
     newer_ = false;
   }
   // Null until the next solve.

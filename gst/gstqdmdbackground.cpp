@@ -11,7 +11,8 @@
  *
  * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
  * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in
- * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes.
+ * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes,
+ * twice as many in formats of more than 8 bits.
  *
  * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
  * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"
@@ -56,7 +57,7 @@ class BackgroundState : public qdmd::State {
     return its.output == Output::mask || its.output == Output::cutout;
   }
   GstFlowReturn make_pictures(GstBuffer* shell, const qdmd::Settings& its,
-                              qdmd::Pictures* pictures) override {
+                              qdmd::OutputPictures* pictures) override {
     GstBuffer* made = nullptr;
     const GstFlowReturn flow =
         GST_BASE_TRANSFORM_GET_CLASS(trans_)->prepare_output_buffer(trans_, shell, &made);
@@ -65,9 +66,9 @@ class BackgroundState : public qdmd::State {
       pictures->add({its.output, &GST_VIDEO_FILTER(trans_)->out_info, std::move(buffer)});
     return flow;
   }
-  GstFlowReturn send(qdmd::Pictures* pictures) override {
+  GstFlowReturn send(qdmd::OutputPictures* pictures) override {
     GstFlowReturn flow = GST_FLOW_OK;
-    for (qdmd::Picture& picture : *pictures)
+    for (qdmd::OutputPicture& picture : *pictures)
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(trans_), picture.buffer.release());
     return flow;
   }
@@ -112,7 +113,7 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
 }
 
 static GstFlowReturn gst_qdmd_background_generate_output(GstBaseTransform* trans, GstBuffer** out) {
-  qdmd::Pictures pictures;
+  qdmd::OutputPictures pictures;
   const GstFlowReturn flow = qdmd::next_pictures(GST_ELEMENT(trans), &pictures);
   *out = flow == GST_FLOW_OK && !pictures.empty() ? pictures.begin()->buffer.release() : nullptr;
   return flow;
@@ -138,10 +139,11 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
     GstCaps* caps = nullptr;
     GstVideoInfo info;
     gst_event_parse_caps(event, &caps);
+    const bool known = gst_video_info_from_caps(&info, caps);
     // Frames that wait belong to the old caps; equal caps change nothing.
-    if (!filter->negotiated || !gst_video_info_from_caps(&info, caps) ||
-        !gst_video_info_is_equal(&info, &filter->in_info))
+    if (!filter->negotiated || !known || !gst_video_info_is_equal(&info, &filter->in_info))
       qdmd::drain(GST_ELEMENT(trans));
+    if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);
   }
   qdmd::before_event(GST_ELEMENT(trans), event);
   return GST_BASE_TRANSFORM_CLASS(parent_class)->sink_event(trans, event);
@@ -196,7 +198,7 @@ static void gst_qdmd_background_class_init(GstQdmdBackgroundClass* klass) {
       "The gst-qdmd authors <gst-qdmd@localhost>");
   for (const auto& [name, direction] :
        {std::pair{"sink", GST_PAD_SINK}, std::pair{"src", GST_PAD_SRC}}) {
-    GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+    GstCaps* caps = gst_caps_from_string(QDMD_CAPS);
     gst_element_class_add_pad_template(element_class,
                                        gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps));
     gst_caps_unref(caps);

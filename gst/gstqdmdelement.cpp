@@ -236,6 +236,26 @@ bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps) {
   return true;
 }
 
+void tell_of_caps(GstElement* self, GstCaps* caps) {
+  gint width = 0, height = 0;
+  const GstStructure* video = gst_caps_get_structure(caps, 0);
+  gst_structure_get_int(video, "width", &width);
+  gst_structure_get_int(video, "height", &height);
+  if (width < 1 || height < 1) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("Caps without a format, a width and a height are no video: put a capsfilter "
+                       "that has them before %s.",
+                       GST_OBJECT_NAME(gst_element_get_factory(self))),
+                      ("%" GST_PTR_FORMAT, static_cast<gpointer>(caps)));
+    return;
+  }
+  GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                    ("A frame of %dx%d is more than GStreamer can hold, whatever window-size and "
+                     "max-memory allow: scale the video down.",
+                     width, height),
+                    ("%" GST_PTR_FORMAT, static_cast<gpointer>(caps)));
+}
+
 // ---- Events, queries, metadata ------------------------------------------------------------------
 
 void before_event(GstElement* self, GstEvent* event) {

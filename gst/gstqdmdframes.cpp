@@ -249,7 +249,7 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
   }
 }
 
-GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
+GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   State* state = state_of(self);
   pictures->clear();
   if (!state->engine.ready()) return GST_FLOW_OK;
@@ -269,9 +269,9 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
   const std::vector<Region>* regions = nullptr;
   Pose pose;
   {
-    std::optional<MappedVideoFrame> frames[Pictures::kMost];
+    std::optional<MappedVideoFrame> frames[OutputPictures::kMost];
     size_t mapped = 0;
-    for (const Picture& picture : *pictures) {
+    for (const OutputPicture& picture : *pictures) {
       auto& frame = frames[mapped++];
       frame.emplace(picture.info, picture.buffer.get(), GST_MAP_WRITE);
       if (*frame) continue;
@@ -289,7 +289,7 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
       pose = engine.next_pose();
       if (settings.regions && mapped > 0) regions = &next_regions(self, settings.regions_min_area);
       size_t next = 0;
-      for (const Picture& picture : *pictures)
+      for (const OutputPicture& picture : *pictures)
         engine.write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
       engine.skip();
       note_solve(self, shell.get());
@@ -301,7 +301,7 @@ GstFlowReturn next_pictures(GstElement* self, Pictures* pictures) {
     }
   }
   if (regions)
-    for (const Picture& picture : *pictures) attach(picture.buffer.get(), *regions);
+    for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
   publish_report(self, 0, 1);
   tell_of_solve(self, shell.get());
   tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
@@ -314,7 +314,7 @@ GstFlowReturn drain(GstElement* self) {
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
   const auto solve = [self](Engine& engine) {
-    const Status status = engine.drain();
+    Status status = engine.drain();
     note_solve(self, nullptr);
     return status;
   };
@@ -324,7 +324,7 @@ GstFlowReturn drain(GstElement* self) {
   }
   tell_of_solve(self, nullptr);
   while (state->goes_on(flow) && state->engine.ready()) {
-    Pictures pictures;
+    OutputPictures pictures;
     flow = next_pictures(self, &pictures);
     if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }
@@ -410,13 +410,14 @@ bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& i
   EngineOptions options = settings.engine;
   options.colours = colours_of(info);
   options.levels = levels_of(info);
+  options.depth = bits_of(info).depth;
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
   const bool configured = with_engine(self, [&](Engine& engine) {
     state->background.keep(engine);
     state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
-    const Status status =
+    Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
     state->colours = options.colours;
     if (status.ok())
@@ -519,7 +520,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       engine.set_masks_expected(masks);
       engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
-      const Status status = engine.push(frame.view<const uint8_t>());
+      Status status = engine.push(frame.view<const uint8_t>());
       note_solve(self, nullptr);
       return status;
     });

@@ -20,7 +20,7 @@ GstFlowReturn prepare_for(GstElement* self, GstBuffer* input);
 GstFlowReturn take_frame(GstElement* self, BufferPtr buffer);
 // The pictures that are wanted of the next ready frame, which has left then; none with OK where
 // none is ready.
-GstFlowReturn next_pictures(GstElement* self, Pictures* pictures);
+GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures);
 // Solves for what is left and pushes it; the next frame begins a new window.
 GstFlowReturn drain(GstElement* self);
 

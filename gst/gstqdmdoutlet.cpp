@@ -32,15 +32,18 @@ void drop_pool(GstQdmdOutlet* outlet) {
 
 // ---- Caps ---------------------------------------------------------------------------------------
 
-// Formats between which only the layout of the samples differs.
-enum class Family { rgb, yuv, grey, none };
-Family family_of(const gchar* name) {
+// Formats between which only the layout of the samples differs: a number for each kind of colours
+// and bits of a sample; 0: no video.
+constexpr size_t kFamilies = 3 * 16 + 1;
+size_t family_of(const gchar* name) {
   const GstVideoFormat format = gst_video_format_from_string(name);
-  if (format == GST_VIDEO_FORMAT_UNKNOWN) return Family::none;
+  if (format == GST_VIDEO_FORMAT_UNKNOWN) return 0;
   const GstVideoFormatInfo* info = gst_video_format_get_info(format);
-  if (GST_VIDEO_FORMAT_INFO_IS_YUV(info)) return Family::yuv;
-  if (GST_VIDEO_FORMAT_INFO_IS_RGB(info)) return Family::rgb;
-  return GST_VIDEO_FORMAT_INFO_IS_GRAY(info) ? Family::grey : Family::none;
+  const size_t depth = GST_VIDEO_FORMAT_INFO_DEPTH(info, 0);
+  if (depth < 1 || depth > 16) return 0;
+  if (GST_VIDEO_FORMAT_INFO_IS_YUV(info)) return depth;
+  if (GST_VIDEO_FORMAT_INFO_IS_RGB(info)) return 16 + depth;
+  return GST_VIDEO_FORMAT_INFO_IS_GRAY(info) ? 32 + depth : 0;
 }
 
 // The element's formats.
@@ -96,12 +99,11 @@ void append_formats(GstCaps* caps, const GstStructure* video, Keep keep) {
 
 // Other layouts of the same colours.
 void append_family(GstCaps* caps, const GstStructure* video) {
-  bool wanted[4] = {};
+  bool wanted[kFamilies] = {};
   const GValue* formats = gst_structure_get_value(video, "format");
-  each_format(formats, [&](const gchar* format) { wanted[size_t(family_of(format))] = true; });
-  append_formats(caps, video, [&](const gchar* format) {
-    return !formats || wanted[size_t(family_of(format))];
-  });
+  each_format(formats, [&](const gchar* format) { wanted[family_of(format)] = true; });
+  append_formats(caps, video,
+                 [&](const gchar* format) { return !formats || wanted[family_of(format)]; });
 }
 
 void append_without_colours(GstCaps* caps, const GstStructure* video, const char* only) {

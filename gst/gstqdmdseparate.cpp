@@ -6,9 +6,9 @@
  * qdmdseparate does what #qdmdbackground does, with one window and one model for all pictures that
  * are wanted: each of its pads `background`, `foreground`, `mask` and `cutout`, requested and
  * released at any time, sends one buffer for each frame, with the frame's own timestamps, flags and
- * metadata. Pictures of one frame leave one after the other, so no pad is ahead of another by more
- * than a frame. A pad that is not linked costs nothing; one whose downstream has ended does not
- * stop the others.
+ * metadata. OutputPictures of one frame leave one after the other, so no pad is ahead of another by
+ * more than a frame. A pad that is not linked costs nothing; one whose downstream has ended does
+ * not stop the others.
  *
  * Each pad has caps of its own: the format of the input, or another layout of the same colours (RGB
  * as RGBA with a cut-out's transparency, I420 as NV12); masks may be GRAY8 beside any format.
@@ -60,7 +60,7 @@ constexpr Kind kKinds[] = {{"mask", Output::mask},
                            {"background", Output::background},
                            {"foreground", Output::foreground}};
 constexpr size_t kCount = std::size(kKinds);
-static_assert(kCount <= qdmd::Pictures::kMost);
+static_assert(kCount <= qdmd::OutputPictures::kMost);
 
 struct UnrefOutlet {
   void operator()(GstQdmdOutlet* outlet) const { gst_object_unref(outlet); }
@@ -128,7 +128,7 @@ class SeparateState : public qdmd::State {
     return wants;
   }
   GstFlowReturn make_pictures(GstBuffer* shell, const qdmd::Settings&,
-                              qdmd::Pictures* pictures) override {
+                              qdmd::OutputPictures* pictures) override {
     for (size_t kind = 0; kind < kCount; ++kind) {
       Leaving& one = leaving_[kind];
       one = {outlet(kind), GST_FLOW_NOT_LINKED};
@@ -141,7 +141,7 @@ class SeparateState : public qdmd::State {
     }
     return GST_FLOW_OK;
   }
-  GstFlowReturn send(qdmd::Pictures* pictures) override {
+  GstFlowReturn send(qdmd::OutputPictures* pictures) override {
     auto picture = pictures->begin();
     for (Leaving& one : leaving_)
       if (one.outlet && one.flow == GST_FLOW_OK)
@@ -221,7 +221,7 @@ static GstFlowReturn gst_qdmd_separate_chain(GstPad*, GstObject* parent, GstBuff
   GstFlowReturn flow = qdmd::prepare_for(self, input);
   if (flow == GST_FLOW_OK) flow = qdmd::take_frame(self, std::move(buffer));
   while (flow == GST_FLOW_OK && state->engine.ready()) {
-    qdmd::Pictures pictures;
+    qdmd::OutputPictures pictures;
     flow = qdmd::next_pictures(self, &pictures);
     if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }
@@ -238,7 +238,11 @@ static gboolean gst_qdmd_separate_take_caps(GstElement* self, GstCaps* caps) {
   // Frames that wait belong to the old caps.
   qdmd::drain(self);
   GstVideoInfo info;
-  if (!gst_video_info_from_caps(&info, caps) || !qdmd::begin_video(self, info, caps)) return FALSE;
+  if (!gst_video_info_from_caps(&info, caps)) {
+    qdmd::tell_of_caps(self, caps);
+    return FALSE;
+  }
+  if (!qdmd::begin_video(self, info, caps)) return FALSE;
   state->sync();
   state->each([caps](GstQdmdOutlet* outlet) { qdmd::negotiate_outlet(outlet, caps); });
   return TRUE;
@@ -430,7 +434,7 @@ static void gst_qdmd_separate_class_init(GstQdmdSeparateClass* klass) {
       "Separates background and foreground of video from a static camera by quaternion dynamic "
       "mode decomposition, into up to four streams at once",
       "The gst-qdmd authors <gst-qdmd@localhost>");
-  GstCaps* caps = gst_caps_from_string(GST_VIDEO_CAPS_MAKE(QDMD_FORMATS));
+  GstCaps* caps = gst_caps_from_string(QDMD_CAPS);
   gst_element_class_add_pad_template(
       element_class, gst_pad_template_new("sink", GST_PAD_SINK, GST_PAD_ALWAYS, caps));
   for (const Kind& kind : kKinds)

@@ -27,26 +27,26 @@ struct Loaded {
 };
 
 // One picture of a frame that leaves, in a buffer with its metadata.
-struct Picture {
+struct OutputPicture {
   Output output = Output::background;
   const GstVideoInfo* info = nullptr;
   BufferPtr buffer;
 };
 
 // All that are wanted of one frame.
-class Pictures {
+class OutputPictures {
  public:
   static constexpr size_t kMost = 4;  // one of each kind
   void clear() {
     while (size_ > 0) of_[--size_] = {};
   }
-  void add(Picture picture) { of_[size_++] = std::move(picture); }
+  void add(OutputPicture picture) { of_[size_++] = std::move(picture); }
   bool empty() const { return size_ == 0; }
-  Picture* begin() { return of_.data(); }
-  Picture* end() { return of_.data() + size_; }
+  OutputPicture* begin() { return of_.data(); }
+  OutputPicture* end() { return of_.data() + size_; }
 
  private:
-  std::array<Picture, kMost> of_;
+  std::array<OutputPicture, kMost> of_;
   size_t size_ = 0;
 };
 
@@ -64,9 +64,9 @@ class State {
   // Adds the pictures that somebody wants of the frame that left `shell`, not drawn yet. Not OK:
   // what waits is dropped.
   virtual GstFlowReturn make_pictures(GstBuffer* shell, const Settings& settings,
-                                      Pictures* pictures) = 0;
+                                      OutputPictures* pictures) = 0;
   // Pushes what is drawn.
-  virtual GstFlowReturn send(Pictures* pictures) = 0;
+  virtual GstFlowReturn send(OutputPictures* pictures) = 0;
   // Somebody takes frames after send() had this flow.
   virtual bool goes_on(GstFlowReturn flow) const { return flow == GST_FLOW_OK; }
 

@@ -60,7 +60,7 @@ void SceneYuv::write(GstVideoFrame* frame, const std::function<const uint8_t*(in
     const int most = (1 << GST_VIDEO_FORMAT_INFO_DEPTH(format, c)) - 1;
     for (int top = 0; top < height; top += rows) {
       const int bottom = std::min(top + rows, height);
-      sums_.assign(static_cast<size_t>(3 * width), 0);
+      sums_.assign(size_t{3} * static_cast<size_t>(width), 0);
       for (int y = top; y < bottom; ++y) {
         const uint8_t* from = row(y);
         for (size_t i = 0; i < sums_.size(); ++i) sums_[i] += from[i];

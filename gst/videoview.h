@@ -11,8 +11,13 @@
 
 namespace qdmd {
 
-// What black, white and neutral chroma are in video of 8 bits, full or limited range as the caps
-// say. Where they do not say it, Y, U and V are of limited range.
+// How the samples of a format lie in memory.
+inline SampleBits bits_of(const GstVideoInfo& info) {
+  return {GST_VIDEO_INFO_COMP_DEPTH(&info, 0), int(GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0))};
+}
+
+// What black, white and neutral chroma are, in the highest 8 bits, full or limited range as the
+// caps say. Where they do not say it, Y, U and V are of limited range.
 inline Levels levels_of(const GstVideoInfo& info) {
   const bool yuv = GST_VIDEO_INFO_IS_YUV(&info);
   GstVideoColorRange range = info.colorimetry.range;
@@ -23,8 +28,10 @@ inline Levels levels_of(const GstVideoInfo& info) {
   Levels levels;
   for (int c = 0; c < 3; ++c) {
     const int from = GST_VIDEO_INFO_IS_GRAY(&info) ? 0 : c;
-    levels.black[c] = static_cast<uint8_t>(offset[from]);
-    levels.white[c] = static_cast<uint8_t>(offset[from] + (yuv && c > 0 ? 0 : scale[from]));
+    const int low = bits_of(info).low();
+    levels.black[c] = static_cast<uint8_t>(offset[from] >> low);
+    levels.white[c] =
+        static_cast<uint8_t>((offset[from] + (yuv && c > 0 ? 0 : scale[from])) >> low);
   }
   return levels;
 }
@@ -38,11 +45,42 @@ inline guint8* component_data(const GstVideoFrame& frame, int component) {
          (wide && offset % 2 == 1 ? offset : 0);
 }
 
-// Maps a buffer for as long as it lives. The map is released before the buffer is handed on.
+// What a buffer's metadata says of it is a frame of these caps; more pixels may lie around it.
+inline bool suits(const GstVideoInfo& info, const GstVideoMeta* meta) {
+  return !meta || (meta->format == GST_VIDEO_INFO_FORMAT(&info) &&
+                   meta->n_planes == GST_VIDEO_INFO_N_PLANES(&info) &&
+                   meta->width >= guint(info.width) && meta->height >= guint(info.height));
+}
+
+// All samples are inside of what was mapped. GStreamer does not look: offsets and strides of the
+// metadata are whatever upstream has written there.
+inline bool has_all_samples(const GstVideoFrame& frame) {
+  for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(&frame); ++c) {
+    const guint plane = GST_VIDEO_FRAME_COMP_PLANE(&frame, c);
+    const GstMapInfo& map = frame.map[frame.meta ? plane : 0];
+    const gint64 before = static_cast<const guint8*>(frame.data[plane]) - map.data;
+    const gint64 last_row =
+        gint64{GST_VIDEO_FRAME_COMP_HEIGHT(&frame, c) - 1} * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c);
+    const gint64 row =
+        gint64{GST_VIDEO_FRAME_COMP_WIDTH(&frame, c)} * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c);
+    if (before + std::min<gint64>(last_row, 0) < 0 ||
+        before + std::max<gint64>(last_row, 0) + row > gint64(map.size))
+      return false;
+  }
+  return true;
+}
+
+// Maps a buffer for as long as it lives. The map is released before the buffer is handed on. False
+// where the buffer does not hold a frame of these caps.
 class MappedVideoFrame {
  public:
   MappedVideoFrame(const GstVideoInfo* info, GstBuffer* buffer, GstMapFlags flags)
-      : mapped_(gst_video_frame_map(&frame_, const_cast<GstVideoInfo*>(info), buffer, flags)) {}
+      : mapped_(suits(*info, gst_buffer_get_video_meta(buffer)) &&
+                gst_video_frame_map(&frame_, const_cast<GstVideoInfo*>(info), buffer, flags)) {
+    if (!mapped_ || has_all_samples(frame_)) return;
+    gst_video_frame_unmap(&frame_);
+    mapped_ = false;
+  }
   ~MappedVideoFrame() {
     if (mapped_) gst_video_frame_unmap(&frame_);
   }
@@ -62,6 +100,7 @@ class MappedVideoFrame {
     BasicImageView<Byte> view;
     view.width = GST_VIDEO_FRAME_WIDTH(&frame_);
     view.height = GST_VIDEO_FRAME_HEIGHT(&frame_);
+    view.bits = bits_of(frame_.info);
     const bool alpha = GST_VIDEO_INFO_HAS_ALPHA(&frame_.info);
     const int components = GST_VIDEO_FRAME_N_COMPONENTS(&frame_);
     bool even = true;
@@ -82,7 +121,7 @@ class MappedVideoFrame {
     for (Spacing& own : view.own) own = {};
     view.pixel_stride = first.pixel_stride;
     view.row_stride = first.row_stride;
-    if (first.pixel_stride == 4 && !alpha) {
+    if (first.pixel_stride == 4 && !alpha && !view.bits.is_deep()) {
       int fourth = 0 + 1 + 2 + 3;
       for (int c = 0; c < 3; ++c) fourth -= GST_VIDEO_FRAME_COMP_POFFSET(&frame_, c);
       view.alpha = static_cast<Byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0)) + fourth;

@@ -2,18 +2,21 @@
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
-#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv
+#   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
+#                                               fuzz, tidy, coverage
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
   libeigen3-dev libhwy-dev libopencv-dev)
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -ugly and -x what
 # the documentation's pipelines and the demo encode and write text with, -opencv the element that
-# tests/bench compares with; gi runs the examples in Python.
+# tests/bench compares with, -libav the lossless encoder of qdmd-archive and what plays H.264 and
+# H.265 of 10 bits, openmpi what starts qdmd-archive; gi runs the examples in Python.
 test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 valgrind
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
-  gstreamer1.0-plugins-ugly gstreamer1.0-x gstreamer1.0-opencv)
+  gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x gstreamer1.0-opencv openmpi-bin
+  libopenmpi-dev)
 # What gst/debian/control asks for beyond build; tests make a package, too.
 package=(debhelper dpkg-dev libopencv-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
@@ -23,6 +26,9 @@ demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
 docs=(python3 python3-matplotlib)
 # What tests/pages/stream.sh compares with.
 opencv=(python3-numpy python3-opencv)
+fuzz=(clang)
+tidy=(clang-tidy)
+coverage=(gcovr)
 
 wanted=()
 for group in "$@"; do
@@ -33,7 +39,10 @@ for group in "$@"; do
     demo) wanted+=("${demo[@]}") ;;
     docs) wanted+=("${docs[@]}") ;;
     opencv) wanted+=("${opencv[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv)" >&2; exit 2 ;;
+    fuzz) wanted+=("${fuzz[@]}") ;;
+    tidy) wanted+=("${tidy[@]}") ;;
+    coverage) wanted+=("${coverage[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage)" >&2; exit 2 ;;
   esac
 done
 

@@ -6,6 +6,7 @@
 #   tests/sanitize.sh --long [KIND...]    the tests in which threads meet, those of the kernels, and
 #                                         of the element: many minutes of compiling for each
 #                                         KIND: thread, address,undefined (default: both)
+#   tests/sanitize.sh --suite [KIND...]   the whole suite, leaks too: an hour or more for each KIND
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -38,11 +39,11 @@ long() {
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
-    thread) names=(pool side_thread gram_slices live_schedule absorb another_scene) ;;
-    *) names=(kernel passes chroma picture combine gram gram_slices robust_fill robust_parts pool side_thread resample) ;;
+    thread) names=(pool side_thread band gram_slices live live_schedule absorb another_scene) ;;
+    *) names=(engine kernel passes chroma digits picture combine gram gram_slices robust_fill robust_parts pool side_thread resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done
-  for name in features live; do targets+=("tests/gst/element-$name-test"); done
+  for name in features live separate separate_same faults; do targets+=("tests/gst/element-$name-test"); done
   ninja -C "$build" gst/libgstqdmd.so "${targets[@]}"
   export GST_PLUGIN_PATH_1_0="$PWD/$build/gst" GST_REGISTRY_1_0="$PWD/$build/registry.bin"
   # No other plugins: some do odd things when they are looked at.
@@ -51,15 +52,34 @@ long() {
     echo "== $target: $kind"
     case "$target" in
       # The rest of them needs plugins, or takes long.
-      *element*) set -- --gtest_filter='PropertyStorm*:Threads*:*OtherThreads*:Freeze*:Reset*' ;;
+      *element*) set -- --gtest_filter='PropertyStorm*:Threads*:*OtherThreads*:Freeze*:Reset*:Pads.ComeAndGo*:Flow*:Queries*:Elements*:Clocks*' ;;
       *) set -- ;;
     esac
     "$build/$target" --gtest_brief=1 "$@"
   done
 }
 
+# All tests as meson runs them. What they look at by address, by time or by valgrind is left out.
+suite() {
+  local kind=$1 build=build-$1 again=()
+  [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
+  meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
+    -Dtests=enabled -Dscene=enabled -Dwerror=false
+  ninja -C "$build"
+  # What GLib and GStreamer keep to the end is theirs.
+  export ASAN_OPTIONS="detect_leaks=1:allocator_may_return_null=1 ${ASAN_OPTIONS/detect_leaks=0/}"
+  export LSAN_OPTIONS="suppressions=$PWD/tests/fuzz/lsan.supp:print_suppressions=0"
+  meson test -C "$build" --no-rebuild --print-errorlogs --timeout-multiplier 20 \
+    --suite core --suite fuzz --suite soak --suite gst-qdmd
+}
+
 tests/install-dependencies.sh build test
-if [ "${1:-}" = --long ]; then
+if [ "${1:-}" = --suite ]; then
+  shift
+  [ "$#" -gt 0 ] || set -- thread address,undefined
+  for kind in "$@"; do suite "$kind"; done
+  exit
+elif [ "${1:-}" = --long ]; then
   shift
   [ "$#" -gt 0 ] || set -- thread address,undefined
   for kind in "$@"; do long "$kind"; done
@@ -74,5 +94,5 @@ slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
 flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
 short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread}_test.cpp
 short address,undefined kernels core/gram/{tile_kernel,kernel,gram,window,block_sums,shared_chroma}.cpp \
-  core/passes/{chroma,combine,median_rows,planes,residual}.cpp core/parallel/pool.cpp \
-  tests/core/{gram,kernel,passes,chroma,combine,shared_chroma}_test.cpp
+  core/passes/{chroma,combine,digits,fill,median_rows,planes,residual}.cpp core/parallel/pool.cpp \
+  tests/core/{gram,kernel,passes,chroma,digits,combine,shared_chroma}_test.cpp

@@ -15,13 +15,27 @@ struct Spacing {
   bool operator==(const Spacing&) const = default;
 };
 
-// 8-bit samples of three channels (R, G, B or Y, U, V) and perhaps of alpha: one type covers every
+// How many of a sample's bits count, and where they are.
+struct SampleBits {
+  // 8: a sample is a byte. 9 to 16: it is a little-endian word at any address, and lies `shift`
+  // bits above the word's lowest; the bits around it are not read and are written as 0.
+  int depth = 8, shift = 0;
+
+  bool operator==(const SampleBits&) const = default;
+  bool is_deep() const { return depth > 8; }
+  // Bits below the highest eight.
+  int low() const { return depth - 8; }
+  int most() const { return (1 << depth) - 1; }
+};
+
+// Samples of three channels (R, G, B or Y, U, V) and perhaps of alpha: one type covers every
 // packed, planar or half-planar layout with any padding. Pointers are to the first sample of each
 // channel. In Y, U and V each chroma sample stands for the pixels that share it.
 template <typename Byte>
 struct BasicImageView {
   Byte* channel[3] = {nullptr, nullptr, nullptr};
   Byte* alpha = nullptr;  // null: the format has none
+  SampleBits bits;        // of all samples, those of alpha included
   // True: samples at `alpha` are padding; they are not read and are written as 255.
   bool alpha_is_padding = false;
   int width = 0, height = 0;

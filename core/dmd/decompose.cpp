@@ -24,10 +24,10 @@ Decomposition single_snapshot() {
 }  // namespace
 
 Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
-                        const DmdOptions& options) {
+                        const DmdOptions& options, double pixels) {
   const auto m = static_cast<int>(gram.rows() / kChannels);
   if (m == 1) return single_snapshot();
-  const BackgroundModes modes = quaternion_modes(snapshots, std::move(gram), options);
+  const BackgroundModes modes = quaternion_modes(snapshots, std::move(gram), options, pixels);
   Decomposition result;
   result.background = TemporalModel(m);
   for (Eigen::Index p = 0; p < modes.eigenvalues.size(); ++p)

@@ -14,13 +14,14 @@ struct Decomposition {
 
 // Q-DMD of the window by the solver that `options` names; arguments as below.
 BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
-                                 const DmdOptions& options);
+                                 const DmdOptions& options, double pixels = 0);
 
 // Q-DMD (the paper's Algorithm 2). `gram` is the exact Gram matrix of `snapshots` in time order
 // (3m x 3m). The pixels are read by Solver::qr and Solver::adjoint only. m >= 1; a single snapshot
-// is its own background.
+// is its own background. pixels: those that `gram` is of, where `snapshots` have fewer (solvers
+// that read pixels are out of place then); 0: theirs.
 Decomposition decompose(const SnapshotRange& snapshots, IntegerMatrix gram,
-                        const DmdOptions& options);
+                        const DmdOptions& options, double pixels = 0);
 
 // Exact DMD of each channel by itself (the paper's Algorithm 1); options.solver is not looked at.
 Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& options);

@@ -13,12 +13,13 @@ QuaternionMatrixd stacked(const QuaternionMatrixd& above, const SnapshotRange& s
   QuaternionMatrixd stack(top + count, m);
   stack.a.topRows(top) = above.a;
   stack.b.topRows(top) = above.b;
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* r = snapshots.plane(t, 0) + first;
-    const uint8_t* g = snapshots.plane(t, 1) + first;
-    const uint8_t* b = snapshots.plane(t, 2) + first;
-    for (Index p = 0; p < count; ++p) stack.set(top + p, t, Quaterniond(0.0, r[p], g[p], b[p]));
-  }
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (Index p = 0; p < count; ++p) {
+      const auto pixel = static_cast<size_t>(first + p);
+      stack.set(top + p, t,
+                Quaterniond(0.0, snapshots.sample(t, 0, pixel), snapshots.sample(t, 1, pixel),
+                            snapshots.sample(t, 2, pixel)));
+    }
   return stack;
 }
 

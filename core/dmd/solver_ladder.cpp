@@ -16,12 +16,13 @@ using Index = Eigen::Index;
 QuaternionMatrixd pixels_of(const SnapshotRange& snapshots) {
   const auto n = static_cast<Index>(snapshots.pixels());
   QuaternionMatrixd x(n, snapshots.size());
-  for (int t = 0; t < snapshots.size(); ++t) {
-    const uint8_t* r = snapshots.plane(t, 0);
-    const uint8_t* g = snapshots.plane(t, 1);
-    const uint8_t* b = snapshots.plane(t, 2);
-    for (Index p = 0; p < n; ++p) x.set(p, t, Quaterniond(0.0, r[p], g[p], b[p]));
-  }
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (Index p = 0; p < n; ++p) {
+      const auto pixel = static_cast<size_t>(p);
+      x.set(p, t,
+            Quaterniond(0.0, snapshots.sample(t, 0, pixel), snapshots.sample(t, 1, pixel),
+                        snapshots.sample(t, 2, pixel)));
+    }
   return x;
 }
 
@@ -73,8 +74,9 @@ std::vector<SpectrumMode> spectrum_of(const SnapshotFactor<double>& factor, DmdO
 // One window, which solvers try one after another.
 class Ladder {
  public:
-  Ladder(const SnapshotRange& snapshots, const QuaternionMatrixd& gram, const DmdOptions& options)
-      : snapshots_(snapshots), gram_(gram), options_(options) {}
+  Ladder(const SnapshotRange& snapshots, const QuaternionMatrixd& gram, const DmdOptions& options,
+         double pixels)
+      : snapshots_(snapshots), gram_(gram), options_(options), pixels_(pixels) {}
 
   BackgroundModes solve() {
     const DmdOptions asked = options_;
@@ -82,8 +84,8 @@ class Ladder {
     if (asked.spectrum) {
       const bool fast = modes.summary.solver == Solver::gram;
       modes.summary.spectrum = std::make_shared<const std::vector<SpectrumMode>>(
-          spectrum_of(fast ? factorize_gram(gram_) : factorize_gram_extended(gram_), asked,
-                      static_cast<double>(snapshots_.pixels()), modes.summary.background_modes));
+          spectrum_of(fast ? factorize_gram(gram_) : factorize_gram_extended(gram_), asked, pixels_,
+                      modes.summary.background_modes));
     }
     return modes;
   }
@@ -134,8 +136,7 @@ class Ladder {
   }
 
   void set_bounds(const SnapshotFactor<double>& factor, BackgroundModes* modes) const {
-    const SolvedWindow solved{gram_, static_cast<double>(snapshots_.pixels()), options_, factor,
-                              *modes};
+    const SolvedWindow solved{gram_, pixels_, options_, factor, *modes};
     modes->summary.rounding_bound = rounding_bound(solved);
     modes->summary.sensitivity = sensitivity(solved);
   }
@@ -147,7 +148,7 @@ class Ladder {
     auto modes = solve_factor(factor, options_);
     modes.summary.solver = Solver::gram;
     if (!usable(modes)) return std::nullopt;
-    const Index most = std::min<Index>(gram_.cols() - 1, static_cast<Index>(snapshots_.pixels()));
+    const Index most = std::min<Index>(gram_.cols() - 1, static_cast<Index>(pixels_));
     const bool low_rank =
         options_.estimator == Estimator::forward_backward || options_.estimator == Estimator::total;
     const Index wanted =
@@ -181,9 +182,7 @@ class Ladder {
     if (const auto careful = extended()) {
       modes.summary.rounding_bound =
           careful->summary.rounding_bound +
-          background_distance(pivoted_factor(), static_cast<double>(snapshots_.pixels()), modes,
-                              *careful)
-              .largest;
+          background_distance(pivoted_factor(), pixels_, modes, *careful).largest;
       modes.summary.sensitivity = careful->summary.sensitivity;
     }
     return modes;
@@ -195,15 +194,17 @@ class Ladder {
   const SnapshotRange& snapshots_;
   const QuaternionMatrixd& gram_;
   DmdOptions options_;
+  double pixels_;
 };
 
 }  // namespace
 
 BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
-                                 const DmdOptions& options) {
+                                 const DmdOptions& options, double pixels) {
   const QuaternionMatrixd g = quaternion_gram(gram);
   gram.resize(0, 0);
-  return Ladder(snapshots, g, options).solve();
+  if (pixels == 0) pixels = static_cast<double>(snapshots.pixels());
+  return Ladder(snapshots, g, options, pixels).solve();
 }
 
 }  // namespace qdmd

@@ -80,4 +80,12 @@ void TemporalModel::weights(double t, Eigen::MatrixXd* out) const {
   weights = weights.unaryExpr([](double v) { return std::clamp(v, -kLargest, kLargest); });
 }
 
+TemporalModel mean_of_frames(int snapshots) {
+  QuaternionMatrixd shares(snapshots, 1);
+  shares.a.setConstant(1.0 / snapshots);
+  TemporalModel model(snapshots);
+  model.add_mode(shares, 1.0, 0, Quaterniond(1.0));
+  return model;
+}
+
 }  // namespace qdmd

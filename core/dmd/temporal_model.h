@@ -52,6 +52,9 @@ class TemporalModel {
   std::vector<Term> terms_;
 };
 
+// The mean of so many snapshots, at all times.
+TemporalModel mean_of_frames(int snapshots);
+
 // lambda^t, with 0^0 = 1, for any real t >= 0 where lambda is 0. Its size saturates at e^600.
 template <typename Real>
 std::complex<Real> power(const std::complex<Real>& lambda, double t) {

@@ -13,22 +13,14 @@ bool is_finite(const DmdSummary& summary) {
          std::isfinite(summary.residual) && std::isfinite(summary.condition);
 }
 
-// L(t) is the same at all times.
-TemporalModel mean_of_frames(int frames) {
-  QuaternionMatrixd shares(frames, 1);
-  shares.a.setConstant(1.0 / frames);
-  TemporalModel model(frames);
-  model.add_mode(shares, 1.0, 0, Quaterniond(1.0));
-  return model;
-}
-
 }  // namespace
 
 Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room, Colours colours,
-                       const DecisionSteps& steps)
+                       const DecisionSteps& steps, const Levels& levels)
     : room_(room),
       learner_(std::move(learner)),
-      decision_(room.frames->width(), room.frames->height(), colours, steps) {
+      decision_(room.frames->width(), room.frames->band(), colours, steps, levels) {
+  for (BackgroundModel& model : models_) model.set_low_bits(room_.frames->low_bits());
   learner_->begin(room_);
 }
 
@@ -95,8 +87,9 @@ void Background::finish(const MaskWishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
-  next_report_.foreground = foreground_statistics(*snapshots_, models_[next()], wishes.threshold,
-                                                  wishes.ignored, room_.frames->width());
+  next_report_.foreground =
+      foreground_statistics(*snapshots_, models_[next()], wishes.threshold, wishes.ignored,
+                            room_.frames->width(), room_.frames->band());
   // Nobody decides before there is a first model.
   if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
     rehearse(wishes);
@@ -105,7 +98,7 @@ void Background::finish(const MaskWishes& wishes) {
 // Whatever a learner did: no model with a number that is not one is ever in use.
 void Background::replace_next() {
   BackgroundModel& model = models_[next()];
-  model.begin(*snapshots_, mean_of_frames(snapshots_->size()), true);
+  model.begin(room_.frames->whole(*snapshots_), mean_of_frames(snapshots_->size()), true);
   model.build_slice(0, pixels());
   next_report_.replaced = true;
   next_report_.dmd = {};

@@ -31,7 +31,8 @@ class Background {
   enum class State { learnt, held, held_in_light };
 
   Background(std::unique_ptr<Learner> learner, const LearnerRoom& room,
-             Colours colours = Colours::rgb, const DecisionSteps& steps = {});
+             Colours colours = Colours::rgb, const DecisionSteps& steps = {},
+             const Levels& levels = {});
 
   Learner& learner() { return *learner_; }
   // Forgets the model and what earlier windows showed.

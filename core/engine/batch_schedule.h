@@ -22,6 +22,7 @@ class BatchSchedule : public Schedule {
 
   bool push(const ImageView& frame, bool freeze, Queue* queue) override;
   void drain(Queue* queue) override;
+  void go_on() override { break_ = false; }
   void restart() override;
   void learn_from(const Learnt& learnt, const Queue& queue) override;
   void show(int index) override;

@@ -36,20 +36,22 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   close();
   options_ = options;
   layout_ = layout_of(options, width, height);
-  auto learner = Learner::make(options, width, height);
+  const Band band = band_of(options, width, height);
+  auto learner = Learner::make(options, width, band);
   const bool live = options.mode == Mode::live;
   const LivePlan plan = plan_of(options, width, height);
-  workers_ = std::make_unique<Workers>(options.threads);
+  // What members tell each other has one order.
+  workers_ = std::make_unique<Workers>(options.threads, !options.team);
   const uint64_t beside = layout_.bytes - layout_.store_bytes;
   frames_ =
-      FrameStore(layout_.capacity, width, height, learner->contents(), options.max_memory - beside);
+      FrameStore(layout_.capacity, width, band, learner->contents(), options.max_memory - beside);
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
       std::move(learner),
       LearnerRoom{&frames_, options.window_size, models_of(options.mode, layout_.late_frames),
                   &workers_->pool(), &clock_},
-      options.colours, options.steps);
+      options.colours, options.steps, options.levels);
   if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
   background_->learner().set_absorb_frames(absorb_frames_);
@@ -93,6 +95,12 @@ void Engine::flush() {
   pace_.restart();
 }
 
+void Engine::begin_anew() {
+  if (!configured() || pending() > 0) return;
+  background_->forget();
+  schedule_->go_on();
+}
+
 Status Engine::push(const ImageView& frame) {
   if (!configured())
     return {Status::Code::not_configured, "configure the engine before pushing frames"};
@@ -100,6 +108,8 @@ Status Engine::push(const ImageView& frame) {
     return {Status::Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
   if (frame.width != frames_.width() || frame.height != frames_.height())
     return {Status::Code::invalid_options, "configure the engine anew for frames of another size"};
+  if (frame.bits.depth != options_.depth)
+    return {Status::Code::invalid_options, "configure the engine anew for samples of other depth"};
   const Clock::Span span(clock_, Clock::frames);
   return flushed_if_it_throws([&]() -> Status {
     workers_->follow();
@@ -180,6 +190,7 @@ OutputTask Engine::task_of(Output output) {
   task.model = &background_->model();
   task.output = output;
   task.constant_alpha = 255;
+  task.constant_alpha_low = static_cast<uint8_t>((1 << frames_.low_bits()) - 1);
   return task;
 }
 
@@ -191,6 +202,11 @@ OutputTask Engine::next_task(Output output) {
   for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(slot, c);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
+  if (frames_.low_bits() > 0) {
+    for (int c = 0; c < kChannels; ++c) task.low[c] = frames_.low(slot, c);
+    task.alpha_low = frames_.alpha_low(slot);
+    task.constant_alpha_low = frames_.constant_alpha_low(slot);
+  }
   return task;
 }
 
@@ -226,7 +242,10 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   const Pose pose = next_pose();
   if (pose.is_rest() || stabilize_output_) return;
   const int slot = frames_.slot(frames_.size() - queue_.pending);
-  for (int c = 0; c < kChannels; ++c) task->x[c] = frames_.untouched(slot, c);
+  for (int c = 0; c < kChannels; ++c) {
+    task->x[c] = frames_.untouched(slot, c);
+    if (frames_.low_bits() > 0) task->low[c] = frames_.untouched_low(slot, c);
+  }
   Resampler* const resampler = &stabilizer_->resampler();
   Pool* const pool = workers_->side().idle() ? &workers_->pool() : nullptr;
   if (level) {
@@ -269,12 +288,13 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
 bool Engine::write_background(const MutableImageView& out) {
   if (!configured() || !background_->known()) return false;
   schedule_->show_newest();
-  write_picture(task_of(Output::background), options_.levels, out, 0, frames_.height());
+  write_picture(task_of(Output::background), options_.levels, out, band().own_begin(),
+                band().own_rows());
   return true;
 }
 
 bool Engine::learnt(Learnt* learnt) {
-  if (!configured() || !background_->known()) return false;
+  if (!configured() || !background_->known() || !band().is_whole()) return false;
   // What it threw, the next frame is told.
   workers_->side().rest();
   schedule_->show_newest();
@@ -288,6 +308,8 @@ bool Engine::learnt(Learnt* learnt) {
 
 Status Engine::may_learn_from(const Learnt& learnt) const {
   if (!configured()) return {Status::Code::not_configured, "configure the engine before it learns"};
+  if (!band().is_whole())
+    return {Status::Code::invalid_options, "processes that share a window load no background"};
   if (learnt.width != frames_.width() || learnt.height != frames_.height())
     return {Status::Code::invalid_options,
             "it is the background of " + std::to_string(learnt.width) + "x" +
@@ -311,17 +333,17 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
     if (masked) decide_next(&task);
-    if (decided_ && !masked) {
+    if (decided_ && !masked && !out.bits.is_deep()) {
       background_->decision().level(0, task.level);
       task.level_stride = background_->decision().level_stride();
     }
     if (masked && options_.mask_softness > 0) soften(levels, &task);
     return_to_frame(&task, output == Output::background || output == Output::foreground);
-    const int height = frames_.height(), together = rows_together(out);
+    const int top = band().own_begin(), height = band().own_rows(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
     const auto write = [&](int first, int count, size_t) {
       const int row = first * together;
-      write_picture(task, levels, out, row, std::min(count * together, height - row));
+      write_picture(task, levels, out, top + row, std::min(count * together, height - row));
     };
     // While the side thread works, its work has the pool.
     if (workers_->side().idle()) {
@@ -331,6 +353,16 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     } else {
       write(0, steps, 0);
     }
+  });
+}
+
+const uint8_t* Engine::whole_mask() {
+  if (!ready()) return nullptr;
+  const Clock::Span span(clock_, Clock::frames);
+  return flushed_if_it_throws([&] {
+    OutputTask task = next_task(Output::mask);
+    decide_next(&task);
+    return background_->decision().whole_mask();
   });
 }
 

@@ -28,9 +28,12 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  // Starts afresh with frames of width x height pixels. If it refuses, nothing has changed.
+  // Starts afresh with frames of width x height pixels. If a team shares them, push() then takes
+  // the rows of band() that are kept, and pictures that are written have its own rows. If it
+  // refuses, nothing has changed.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
+  const Band& band() const { return frames_.band(); }
   // Gives all memory and threads back; configure() comes next.
   void close();
 
@@ -44,8 +47,12 @@ class Engine {
   // Writes a picture of the next frame, which stays the next frame: any number of pictures can be
   // made from one computation. Call only while ready(); `out` has the configured size. `levels` are
   // its black, white and neutral chroma: the configured ones, or, for a mask in another format, the
-  // levels of that format.
+  // levels of that format. Samples have the configured depth, or 8 bits: the highest ones.
   void write(Output output, const Levels& levels, const MutableImageView& out);
+  // The mask of the frame that leaves next, of the whole picture, even if a team shares it: 255
+  // where foreground, else 0, width * height samples in row order. Good until skip(). Null unless
+  // ready().
+  const uint8_t* whole_mask();
   // Call it when the next frame has left, and only while ready().
   void skip();
   // write() in the configured levels, and skip().
@@ -75,6 +82,9 @@ class Engine {
   Status drain();
   // Drops all frames and forgets the window and the model.
   void flush();
+  // No frame waits: windows to come know nothing of those before, but if one of them ends early, it
+  // has their frames. Batch only.
+  void begin_anew();
 
   // Frames that are pushed before a frame leaves: EngineLayout::delay.
   int delay() const { return layout_.delay; }

@@ -7,10 +7,20 @@
 #include "core/foreground/decision.h"
 #include "core/foreground/soft_mask.h"
 #include "core/learn/learner.h"
+#include "core/learn/robust/robust_learner.h"
 #include "core/parallel/workers.h"
 
 namespace qdmd {
 namespace {
+
+// The most that may share pictures of this size: each has rows of cells.
+int most_members(int width, int height) { return Grid(width, height).rows; }
+
+// More than the sums of a Gram matrix can hold. Bytes of fewer pixels, in any window, are below
+// 2^63.
+bool has_too_many_pixels(int width, int height) {
+  return static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
+}
 
 LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
@@ -35,7 +45,9 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
 }
 
 EngineLayout layout_with(const EngineOptions& options, const Learner& learner, int width,
-                         int height, int late_frames) {
+                         int picture_height, int late_frames) {
+  const Band band = band_of(options, width, picture_height);
+  const int height = band.rows();
   const bool live = options.mode == Mode::live;
   EngineLayout layout;
   layout.late_frames = late_frames;
@@ -45,15 +57,11 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   // They are read until the last of them has left.
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   layout.frame_bytes =
+      (options.depth > 8 ? 2 : 1) *
       PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, learner.contents());
-  // Sums over more pixels than the Gram matrix can have may be any number.
-  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36) {
-    layout.bytes = UINT64_MAX;
-    return layout;
-  }
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, learner.contents());
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
-  const uint64_t masks = Decision::bytes(width, height) + layout.soft_bytes;
+  const uint64_t masks = Decision::bytes(width, band) + layout.soft_bytes;
   const uint64_t camera = options.stabilize == Stabilize::off
                               ? 0
                               : Stabilizer::bytes(width, height) + Restorer::bytes(width, height);
@@ -67,7 +75,8 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
 }  // namespace
 
 LivePlan plan_of(const EngineOptions& options, int width, int height) {
-  return plan_for(options, *Learner::make(options, width, height), width, height);
+  return plan_for(options, *Learner::make(options, width, band_of(options, width, height)), width,
+                  height);
 }
 
 Models models_of(Mode mode, int late_frames) {
@@ -76,12 +85,17 @@ Models models_of(Mode mode, int late_frames) {
 }
 
 EngineLayout layout_of(const EngineOptions& options, int width, int height) {
-  const auto learner = Learner::make(options, width, height);
+  if (has_too_many_pixels(width, height)) {
+    EngineLayout layout;
+    layout.bytes = UINT64_MAX;
+    return layout;
+  }
+  const auto learner = Learner::make(options, width, band_of(options, width, height));
   if (options.mode == Mode::live)
     return layout_with(options, *learner, width, height,
                        plan_for(options, *learner, width, height).most_late_frames());
   // Less time for a solve where there is no room for more frames.
-  for (int late = late_frames_of(options, *learner);; late /= 2) {
+  for (int late = options.team ? 0 : late_frames_of(options, *learner);; late /= 2) {
     const EngineLayout layout = layout_with(options, *learner, width, height, late);
     if (late == 0 || layout.bytes <= options.max_memory) return layout;
   }
@@ -91,6 +105,47 @@ std::string describe(const EngineOptions& options, int width, int height) {
   return std::to_string(options.window_size) + " frames of " + std::to_string(width) + "x" +
          std::to_string(height);
 }
+
+Band band_of(const EngineOptions& options, int width, int height) {
+  if (!options.team) return Band(height);
+  const Grid grid(width, height);
+  const int size = options.team->size();
+  std::vector<int> ends;
+  for (int rank = 1; rank <= size; ++rank)
+    ends.push_back(grid.top(static_cast<int>(int64_t{rank} * grid.rows / size)));
+  const int learnt = options.method == Method::robust ? RobustLearner::reach(options) : 0;
+  return Band(options.team, std::move(ends), learnt + Decision::reach(width, height));
+}
+
+namespace {
+
+Status check_team(const EngineOptions& options, int width, int height) {
+  using Code = Status::Code;
+  if (!options.team) return {};
+  if (options.mode != Mode::batch || options.stabilize != Stabilize::off ||
+      options.mask_softness > 0 || options.low_bits() > 0)
+    return {
+        Code::invalid_options,
+        "processes share a window in mode=batch with stabilize=off and mask-softness=0 only, of "
+        "video of 8 bits"};
+  // What an earlier window's background was is not known as far outwards as its frames are.
+  if (options.method == Method::robust && options.remembers)
+    return {Code::invalid_options,
+            "processes that share a window forget it before the next: remembers=false"};
+  if (options.method != Method::dmd &&
+      (options.dmd.solver == Solver::qr || options.dmd.solver == Solver::adjoint))
+    return {Code::invalid_options,
+            "solver=qr and solver=adjoint need all pixels in one process: use gram, gram-extended "
+            "or auto"};
+  const int most = most_members(width, height);
+  if (options.team->size() > most)
+    return {Code::invalid_options, "frames of " + std::to_string(width) + "x" +
+                                       std::to_string(height) + " can be shared by " +
+                                       std::to_string(most) + " processes at most: start fewer"};
+  return {};
+}
+
+}  // namespace
 
 Status check_options(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
@@ -111,14 +166,20 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.mask_softness < 0 || options.mask_softness > kMostSoftness)
     return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
+  if (options.depth < 8 || options.depth > EngineOptions::kMostDepth)
+    return {Code::invalid_options, "a sample has 8 to 16 bits"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
+  if (Status status = check_team(options, width, height); !status.ok()) return status;
   const EngineLayout layout = layout_of(options, width, height);
-  const uint64_t solver =
-      layout.bytes == UINT64_MAX
-          ? 0
-          : Learner::make(options, width, height)->solver_bytes(options.window_size);
+  if (layout.bytes == UINT64_MAX)
+    return {Code::too_much_memory,
+            "A window-size of " + describe(options, width, height) +
+                " needs more memory than there can be, whatever max-memory allows: scale the video "
+                "down, or lower window-size."};
+  const uint64_t solver = Learner::make(options, width, band_of(options, width, height))
+                              ->solver_bytes(options.window_size);
   if (solver > options.max_memory)
     return {Code::too_much_memory,
             "solver=adjoint with a window-size of " + describe(options, width, height) +

@@ -10,6 +10,7 @@
 #include "core/engine/live_plan.h"
 #include "core/foreground/decision.h"
 #include "core/learn/learner.h"
+#include "core/parallel/band.h"
 #include "core/parallel/workers.h"
 
 namespace qdmd {
@@ -31,6 +32,10 @@ struct EngineOptions : LearnOptions {
   int mask_softness = 0;                    // pixels, Engine::set_mask_softness()
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
+  // Processes that have the other rows of the frames, one Engine each, all with the same options;
+  // or null. Batch mode, `stabilize` off, hard masks, windows that do not remember others, and no
+  // solver that reads pixels.
+  Team* team = nullptr;
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;
@@ -47,7 +52,12 @@ struct EngineLayout {
   uint64_t soft_bytes = 0;   // of soft masks
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };
+// Bytes are UINT64_MAX, and the rest is nothing, where there are too many pixels.
 EngineLayout layout_of(const EngineOptions& options, int width, int height);
+
+// The rows that this process has of frames of that size: it pushes those that are kept, and has
+// pictures of its own ones. Without a team: all.
+Band band_of(const EngineOptions& options, int width, int height);
 
 // Models of batch and live mode.
 Models models_of(Mode mode, int late_frames);

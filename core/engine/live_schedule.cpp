@@ -108,8 +108,8 @@ void LiveSchedule::begin_work() {
       piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices,
                      std::chrono::steady_clock::now(), piece_took_};
   } else if (step.group > 0) {
-    group_ =
-        Group{span, step.group, step.gram_slices, 0, step.solve, step.build_slices, first_frame};
+    group_ = GramGroup{span,       step.group,        step.gram_slices, 0,
+                       step.solve, step.build_slices, first_frame};
   }
   if (group_ || build_) run(at_once);
 }

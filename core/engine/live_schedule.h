@@ -27,7 +27,7 @@ class LiveSchedule : public Schedule {
 
  private:
   // A group of frames on its way into the Gram matrix.
-  struct Group {
+  struct GramGroup {
     SnapshotRange span;
     int frames, slices, done = 0;
     bool solve;
@@ -75,7 +75,7 @@ class LiveSchedule : public Schedule {
   std::optional<Piece> piece_;
   // The side thread's while it works.
   std::chrono::steady_clock::duration piece_took_{};  // the last one
-  std::optional<Group> group_;
+  std::optional<GramGroup> group_;
   std::optional<Build> build_;
   std::optional<int64_t> finished_;  // first frame of a solve that waits to be published
   MaskWishes wishes_;                // as they were when the work began

@@ -54,6 +54,9 @@ class Schedule {
   uint64_t scenes() const { return scenes_; }
   // All that waits becomes ready. The next frame begins a new window.
   virtual void drain(Queue* queue) = 0;
+  // After drain(), when all frames have left: the next frame comes after the one before it, after
+  // all.
+  virtual void go_on() {}
   // Drops the work that is under way, and all frames. The background is forgotten, too.
   virtual void restart() = 0;
   // What an earlier run learnt, of frames of this size, no solve being under way. No frame is lost.

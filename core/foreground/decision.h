@@ -1,10 +1,12 @@
 // Which pixels of a stream's frames are foreground.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
 #include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
@@ -47,9 +49,15 @@ struct Comparison {
 // come in the stream's order.
 class Decision {
  public:
-  // Takes all memory. For frames of width x height pixels of these colours.
-  Decision(int width, int height, Colours colours, const DecisionSteps& steps = {});
-  static uint64_t bytes(int width, int height);
+  // Takes all memory. For frames of that width and these colours, in which black is that of
+  // `levels`, and a band of their rows: what it is given, and what it says, has the rows that are
+  // kept; of these the own ones are decided as in the whole picture if reach() rows are kept around
+  // them, and masks are the same everywhere.
+  Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps = {},
+           const Levels& levels = {});
+  static uint64_t bytes(int width, const Band& band);
+  // What own rows depend on, in rows of the frames and their L.
+  static int reach(int width, int height);
 
   // The next frame is of another stream.
   void forget();
@@ -61,8 +69,10 @@ class Decision {
   // Decides the next frame; the calls below are about this frame. pool may be null. Results do not
   // depend on it.
   void decide(const Comparison& frame, Pool* pool);
-  // 255 where foreground, else 0; width * height samples in row order.
+  // 255 where foreground, else 0; samples in row order.
   const uint8_t* mask() const { return of_.mask.data(); }
+  // The same of the whole picture.
+  const uint8_t* whole_mask() const { return band_.is_whole() ? mask() : whole_.data(); }
   // The same where shadows are marked: 255 where light alone differs.
   const uint8_t* shaded() const {
     return shadows_ == Shadows::marked ? of_.shaded.data() : nullptr;
@@ -79,7 +89,7 @@ class Decision {
     int width, height, step, margin, reach;
     size_t stride;
 
-    Shape(int width, int height, bool votes);
+    Shape(int width, const Band& band, bool votes);
     size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
     size_t padded() const { return stride * static_cast<size_t>(height); }
     // Of a row with margins, and of one without.
@@ -116,6 +126,13 @@ class Decision {
   template <typename Band>
   void in_bands(int length, int bands, Band band);
   void clear_marks();
+  void share_mask();
+  // Of the rows that are kept: where those of a row of cells begin, and that row of the mask, of
+  // the picture's if there is none.
+  int top(int grid_row) const {
+    return std::clamp(texture_.grid().top(grid_row) - band_.first(), 0, band_.rows());
+  }
+  const uint8_t* mask_row(int y) const;
   void look(int parts);
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
@@ -129,15 +146,17 @@ class Decision {
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
 
+  Band band_;
   Shape shape_;
   DecisionSteps steps_;
   Shadows shadows_ = Shadows::background;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
-  uint8_t black_[3] = {0, 0, 0};
+  uint8_t black_[3];
   bool knows_light_;
   MovingTexture texture_;
   PixelNoise noise_;
   Specks specks_;
+  std::vector<uint8_t> whole_, packed_;  // of a band: the picture's mask, and its bits
   int64_t frames_ = 0;
   uint64_t picture_ = 0;  // of the model: whose L there is
   Now now_;

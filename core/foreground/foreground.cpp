@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "core/passes/planes.h"
@@ -36,31 +38,43 @@ double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * 
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, const IgnoredAreas& ignored,
-                                           int width) {
+                                           int width, const Band& band) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
   // The largest quaternion norm of a difference is 255 sqrt(3).
-  std::array<uint32_t, static_cast<size_t>(442 * kBinsPerLevel)> histogram{}, beyond_limits{};
+  constexpr auto kBins = static_cast<size_t>(442 * kBinsPerLevel);
+  // All pixels by distance, and those beyond their limits.
+  std::array<int64_t, 2 * kBins> counts{};
+  const std::span histogram = std::span(counts).first(kBins),
+                  beyond_limits = std::span(counts).last(kBins);
   const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
-  uint64_t total = 0;
   BackgroundRun background;
   const int frames = std::min(kFrames, snapshots.size());
-  const size_t runs = (snapshots.pixels() + kMaxRun - 1) / kMaxRun;
+  // In pixels of the picture: all, those that the snapshots have from `kept` on, and the own ones.
+  const auto row = static_cast<size_t>(width);
+  const bool whole = band.is_whole();
+  const size_t pixels = whole ? snapshots.pixels() : row * static_cast<size_t>(band.height()),
+               kept = whole ? 0 : row * static_cast<size_t>(band.first()),
+               own = whole ? 0 : row * static_cast<size_t>(band.own_first()),
+               own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
+  const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
   const size_t step = (runs + kRunsPerFrame - 1) / kRunsPerFrame;
   for (int i = 0; i < frames; ++i) {
     const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
     model.set_time(t);
     // Other frames look at other runs.
     for (size_t run = static_cast<size_t>(i) % std::max<size_t>(step, 1); run < runs; run += step) {
-      const size_t first = run * kMaxRun;
-      const size_t count = std::min(kMaxRun, snapshots.pixels() - first);
+      const size_t begin = std::max(run * kMaxRun, own),
+                   end = std::min({(run + 1) * kMaxRun, pixels, own_end});
+      if (begin >= end) continue;
+      const size_t first = begin - kept, count = end - begin;
       model.evaluate(first, count, background.rows);
-      uint8_t counts[kMaxRun];
-      std::fill_n(counts, count, uint8_t{1});
-      ignored.clear_run(first, count, width, counts);
+      uint8_t counted[kMaxRun];
+      std::fill_n(counted, count, uint8_t{1});
+      ignored.clear_run(begin, count, width, counted);
       for (size_t p = 0; p < count; ++p) {
-        if (!counts[p]) continue;
+        if (!counted[p]) continue;
         int squared = 0;
         for (int c = 0; c < kChannels; ++c) {
           const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
@@ -70,20 +84,21 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
         const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
         ++histogram[bin];
         if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
-        ++total;
       }
     }
   }
 
+  if (!whole) band.team()->sum(Talk::statistics, counts);
+  const int64_t total = std::accumulate(histogram.begin(), histogram.end(), int64_t{0});
   ForegroundStatistics statistics;
-  uint64_t below = 0;
+  int64_t below = 0;
   size_t quartile = 0;
   while (quartile + 1 < histogram.size() && 4 * (below + histogram[quartile]) < total)
     below += histogram[quartile++];
   statistics.noise = static_cast<double>(quartile) / kBinsPerLevel / 1.1012;
   statistics.threshold =
       fixed_threshold > 0 ? fixed_threshold : automatic_threshold(statistics.noise);
-  uint64_t above = 0;
+  int64_t above = 0;
   for (size_t bin = 0; bin < histogram.size(); ++bin)
     if (static_cast<double>(bin) / kBinsPerLevel > statistics.threshold)
       above += beyond_limits[bin];

@@ -4,6 +4,7 @@
 #include "core/base/image_view.h"
 #include "core/foreground/ignored.h"
 #include "core/model/background_model.h"
+#include "core/parallel/band.h"
 
 namespace qdmd {
 
@@ -30,10 +31,10 @@ double automatic_threshold(double noise);
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
 // `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
 // Leaves the model's time at the last sampled snapshot. Pixels of snapshots, `width` wide, that are
-// ignored say nothing.
+// ignored say nothing. band: which rows of the pictures the snapshots have; by default all.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, const IgnoredAreas& ignored = {},
-                                           int width = 1);
+                                           int width = 1, const Band& band = {});
 
 // One frame of a window and what its pictures are made of.
 struct OutputTask {
@@ -53,6 +54,10 @@ struct OutputTask {
   // nulls.
   const uint8_t* level[3] = {nullptr, nullptr, nullptr};
   size_t level_stride = 0;
+  // Of samples of more than 8 bits what is below the highest 8, of x and of alpha; else nulls.
+  const uint8_t* low[3] = {nullptr, nullptr, nullptr};
+  const uint8_t* alpha_low = nullptr;
+  uint8_t constant_alpha_low = 0;
 
   // L of pixels left .. left + count - 1 of a row that is `width` pixels wide. It is computed into
   // `room` unless `level` has it.

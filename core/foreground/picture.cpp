@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/foreground/deep_picture.h"
 #include "core/passes/chroma.h"
 #include "core/passes/planes.h"
 #include "core/passes/soft_edge.h"
@@ -281,6 +282,10 @@ int rows_together(const MutableImageView& view) {
 
 void write_picture(const OutputTask& task, const Levels& levels, const MutableImageView& out,
                    int first_row, int row_count) {
+  if (out.bits.is_deep()) {
+    write_deep_picture(task, levels, out, first_row, row_count);
+    return;
+  }
   // It takes rows without gaps for one.
   if (out.is_even() && out.channel[1] != out.channel[0] && levels.is_full()) {
     write_output(task, out, first_row, row_count);

@@ -1,9 +1,11 @@
 #include "core/frames/frame_store.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 #include "core/passes/chroma.h"
+#include "core/passes/digits.h"
 #include "core/passes/planes.h"
 #include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
@@ -19,8 +21,14 @@ ChromaShape shape_of(int width, int height, const FrameContents& contents) {
   return {width, height, contents.chroma_columns, contents.chroma_rows};
 }
 
-// Samples of chroma that are spread to all pixels.
+// Samples of a channel, of the own rows.
+size_t samples_of(const Band& band, int width, int step) {
+  return static_cast<size_t>(band.samples(step)) * sample_count(width, step);
+}
+
+// Samples of chroma that are spread to all pixels; of deep ones two digits of a row.
 size_t spread_size(int width, int height, const FrameContents& contents) {
+  if (contents.low_bits > 0) return 2 * static_cast<size_t>(width);
   const bool needed = contents.sample_step > 1 || contents.cells_along > 0;
   return needed && contents.chroma_columns > 1 ? 2 * pixels_of(width, height) : 0;
 }
@@ -32,51 +40,77 @@ uint8_t first_alpha(const ImageView& frame) {
 
 }  // namespace
 
-FrameStore::FrameStore(int capacity, int width, int height, const FrameContents& contents,
+FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameContents& contents,
                        uint64_t most_bytes)
-    : width_(width),
-      height_(height),
+    : band_(band),
+      width_(width),
+      height_(band.rows()),
       sample_step_(contents.sample_step),
+      low_bits_(contents.low_bits),
       most_bytes_(most_bytes),
-      planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height, contents))
-                                          : Window(capacity, pixels_of(width, height))),
-      spread_(spread_size(width, height, contents)),
+      planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height_, contents))
+                                          : Window(capacity, pixels_of(width, height_))),
+      spread_(spread_size(width, height_, contents)),
       constant_alpha_(static_cast<size_t>(capacity), 255),
       varies_(static_cast<size_t>(capacity), 0),
       poses_(static_cast<size_t>(capacity)) {
-  if (sample_step_ > 1) samples_ = PlaneSlots(capacity, sample_count(width, height, sample_step_));
+  if (low_bits_ > 0) {
+    low_ = PlaneSlots(capacity, pixels_of(width, height_));
+    if (sample_step_ > 1)
+      low_samples_ = PlaneSlots(capacity, samples_of(band, width, sample_step_));
+    constant_alpha_low_.resize(static_cast<size_t>(capacity), 255);
+  }
+  if (sample_step_ > 1) samples_ = PlaneSlots(capacity, samples_of(band, width, sample_step_));
   if (contents.cells_along > 0) {
-    grid_ = Grid(width, height, contents.cells_along);
+    grid_ = Grid(width, band.height(), contents.cells_along);
     cells_ = GridFrames(grid_, capacity);
   }
 }
 
-uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
+uint64_t FrameStore::bytes(int capacity, int width, const Band& band,
+                           const FrameContents& contents) {
+  const int height = band.rows();
   uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents));
   uint64_t beside =
       (2 + sizeof(Pose)) * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
+  const bool deep = contents.low_bits > 0;
   if (contents.sample_step > 1)
-    beside += PlaneSlots::bytes(capacity, sample_count(width, height, contents.sample_step));
+    beside +=
+        (deep ? 2 : 1) * PlaneSlots::bytes(capacity, samples_of(band, width, contents.sample_step));
   if (contents.cells_along > 0)
-    beside += GridFrames::bytes(Grid(width, height, contents.cells_along), capacity);
+    beside += GridFrames::bytes(Grid(width, band.height(), contents.cells_along), capacity);
+  if (deep) {
+    beside += static_cast<uint64_t>(capacity);
+    if (__builtin_add_overflow(bytes, PlaneSlots::bytes(capacity, pixels_of(width, height)),
+                               &bytes))
+      return std::numeric_limits<uint64_t>::max();
+  }
   if (__builtin_add_overflow(bytes, beside, &bytes)) return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
 
 uint64_t FrameStore::bytes() const {
-  return planes_.bytes() + samples_.bytes() + cells_.bytes() + (alpha_ ? alpha_bytes() : 0) +
-         spread_.size() + constant_alpha_.size() + varies_.size() + untouched_.bytes() +
+  return planes_.bytes() + low_.bytes() + samples_.bytes() + low_samples_.bytes() + cells_.bytes() +
+         (alpha_ ? alpha_bytes() : 0) + spread_.size() + constant_alpha_.size() +
+         constant_alpha_low_.size() + varies_.size() + untouched_.bytes() + untouched_low_.bytes() +
          poses_.size() * sizeof(Pose);
 }
 
 bool FrameStore::append(const ImageView& frame) {
   const int slot = planes_.append();
   ++frames_taken_;
+  poses_[static_cast<size_t>(slot)] = {};
+  if (low_bits_ > 0) {
+    low_.pad(slot);
+    take_deep_planes(slot, frame);
+    if (!take_deep_alpha(slot, frame)) return false;
+    take_contents(slot);
+    return true;
+  }
   const uint8_t alpha = first_alpha(frame);
   const bool constant = take_planes(slot, frame, alpha);
   varies_[static_cast<size_t>(slot)] = !constant;
   constant_alpha_[static_cast<size_t>(slot)] = alpha;
-  poses_[static_cast<size_t>(slot)] = {};
   if (!constant && !keep_alpha(slot, frame)) return false;
   take_contents(slot);
   return true;
@@ -88,18 +122,26 @@ void FrameStore::take_contents(int slot) {
   if (sample_step_ > 1 || cells_.cells() > 0) read_planes(planes_, slot, spread_.data(), planes);
   if (sample_step_ > 1) {
     samples_.pad(slot);
+    const int top = band_.first_sample(sample_step_);
     for (int c = 0; c < kChannels; ++c)
-      take_samples(planes[c], width_, height_, sample_step_, samples_.plane(slot, c));
+      take_samples(planes[c] + ptrdiff_t{top - band_.first()} * width_, width_,
+                   band_.own_end() - top, sample_step_, samples_.plane(slot, c));
+    if (low_bits_ > 0) {
+      low_samples_.pad(slot);
+      for (int c = 0; c < kChannels; ++c)
+        take_samples(low_.plane(slot, c) + ptrdiff_t{top - band_.first()} * width_, width_,
+                     band_.own_end() - top, sample_step_, low_samples_.plane(slot, c));
+    }
   }
-  if (cells_.cells() > 0)
-    for (int c = 0; c < kChannels; ++c) cell_means(grid_, planes[c], cells_.plane(slot, c));
+  if (cells_.cells() > 0) find_cells(grid_, band_, planes, &cells_, slot);
 }
 
 bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {
   if (planes_.shape().is_shared()) return false;
   if (untouched_.capacity() == 0) {
-    const uint64_t more = PlaneSlots::bytes(capacity(), planes_.pixels());
+    const uint64_t more = (low_bits_ > 0 ? 2 : 1) * PlaneSlots::bytes(capacity(), planes_.pixels());
     if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
+    if (low_bits_ > 0) untouched_low_ = PlaneSlots(capacity(), planes_.pixels());
     untouched_ = PlaneSlots(capacity(), planes_.pixels());
   }
   const int slot = this->slot(index), before = index > 0 ? this->slot(index - 1) : slot;
@@ -113,9 +155,21 @@ bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool*
     resampler->run(untouched_.plane(slot, c), affine(inverse(pose), middle_of(width_, height_)),
                    plane, width_, height_, pool);
   }
+  if (low_bits_ > 0) keep_low_of_moved(slot, pose, was_moved);
   poses_[static_cast<size_t>(slot)] = pose;
   take_contents(slot);
   return true;
+}
+
+void FrameStore::keep_low_of_moved(int slot, const Pose& pose, bool was_moved) {
+  for (int c = 0; c < kChannels; ++c) {
+    uint8_t* const plane = low_.plane(slot, c);
+    if (!was_moved) std::copy_n(plane, planes_.pixels(), untouched_low_.plane(slot, c));
+    if (pose.is_rest())
+      std::copy_n(untouched_low_.plane(slot, c), planes_.pixels(), plane);
+    else
+      std::memset(plane, 1 << (low_bits_ - 1), planes_.pixels());
+  }
 }
 
 // True: every alpha sample is `alpha`.
@@ -135,12 +189,72 @@ bool FrameStore::take_planes(int slot, const ImageView& frame, uint8_t alpha) {
   return is_constant_alpha(frame, 0, height_, alpha);
 }
 
-bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
-  if (!alpha_) {
-    if (bytes_with_alpha() > most_bytes_) return false;
-    // Without touching it.
-    alpha_ = std::make_unique_for_overwrite<uint8_t[]>(alpha_bytes());
+// Each sample for all pixels that share it.
+void FrameStore::take_deep_planes(int slot, const ImageView& frame) {
+  const auto width = static_cast<size_t>(width_);
+  for (int c = 0; c < kChannels; ++c) {
+    uint8_t *high = planes_.plane(slot, c), *low = low_.plane(slot, c);
+    if (c > 0 && frame.channel[c] == frame.channel[0]) {
+      std::memcpy(high, planes_.plane(slot, 0), planes_.pixels());
+      std::memcpy(low, low_.plane(slot, 0), planes_.pixels());
+      continue;
+    }
+    const Spacing at = frame.spacing(c);
+    const size_t samples =
+        (width + static_cast<size_t>(at.columns) - 1) / static_cast<size_t>(at.columns);
+    for (int y = 0; y < height_; ++y, high += width, low += width) {
+      const uint8_t* const from = frame.channel[c] + y / at.rows * at.row_stride;
+      if (y % at.rows != 0) {
+        std::memcpy(high, high - width, width);
+        std::memcpy(low, low - width, width);
+      } else if (at.columns == 1) {
+        split_digits(from, at.pixel_stride, frame.bits, width, high, low);
+      } else {
+        uint8_t* const room = spread_.data();
+        split_digits(from, at.pixel_stride, frame.bits, samples, room, room + width);
+        spread_samples(room, 1, at.columns, width, high);
+        spread_samples(room + width, 1, at.columns, width, low);
+      }
+    }
   }
+}
+
+// False: no room for alpha that varies.
+bool FrameStore::take_deep_alpha(int slot, const ImageView& frame) {
+  const auto s = static_cast<size_t>(slot), width = static_cast<size_t>(width_);
+  constant_alpha_[s] = 255;
+  constant_alpha_low_[s] = static_cast<uint8_t>((1 << low_bits_) - 1);
+  varies_[s] = false;
+  if (!frame.alpha) return true;
+  const Spacing at = frame.spacing(3);
+  split_digits(frame.alpha, at.pixel_stride, frame.bits, 1, &constant_alpha_[s],
+               &constant_alpha_low_[s]);
+  uint8_t *const high = spread_.data(), *const low = high + width;
+  for (int y = 0; y < height_ && !varies_[s]; ++y) {
+    split_digits(frame.alpha + y * at.row_stride, at.pixel_stride, frame.bits, width, high, low);
+    varies_[s] =
+        !are_all(high, constant_alpha_[s], width) || !are_all(low, constant_alpha_low_[s], width);
+  }
+  if (!varies_[s]) return true;
+  if (!make_alpha()) return false;
+  uint8_t* to = alpha_of(slot);
+  const size_t digits = static_cast<size_t>(capacity()) * planes_.pixels();
+  for (int y = 0; y < height_; ++y, to += width)
+    split_digits(frame.alpha + y * at.row_stride, at.pixel_stride, frame.bits, width, to,
+                 to + digits);
+  return true;
+}
+
+bool FrameStore::make_alpha() {
+  if (alpha_) return true;
+  if (bytes_with_alpha() > most_bytes_) return false;
+  // Without touching it.
+  alpha_ = std::make_unique_for_overwrite<uint8_t[]>(alpha_bytes());
+  return true;
+}
+
+bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
+  if (!make_alpha()) return false;
   uint8_t* to = alpha_of(slot);
   const Spacing at = frame.spacing(3);
   for (int row = 0; row < height_; ++row, to += width_)
@@ -151,6 +265,11 @@ bool FrameStore::keep_alpha(int slot, const ImageView& frame) {
 
 const uint8_t* FrameStore::alpha(int slot) const {
   return varies_[static_cast<size_t>(slot)] ? alpha_of(slot) : nullptr;
+}
+
+const uint8_t* FrameStore::alpha_low(int slot) const {
+  const uint8_t* const high = alpha(slot);
+  return high ? high + static_cast<size_t>(capacity()) * planes_.pixels() : nullptr;
 }
 
 }  // namespace qdmd

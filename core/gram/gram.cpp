@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 
 namespace qdmd {
 namespace {
@@ -31,17 +32,18 @@ size_t part_count(size_t threads, uint64_t pairs, size_t length) {
 }
 
 // Elements of one thread's sums of a call.
-size_t sums_size(int capacity) {
-  return static_cast<size_t>(kChannels * std::min(kRowSnapshots, capacity)) *
-         static_cast<size_t>(kChannels * capacity);
+size_t sums_size(int capacity, int digits) {
+  const int planes = kChannels * digits;
+  return static_cast<size_t>(planes * std::min(kRowSnapshots, capacity)) *
+         static_cast<size_t>(planes * capacity);
 }
 
 }  // namespace
 
-uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape) {
-  const auto cols = static_cast<uint64_t>(kChannels * capacity);
+uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape, int digits) {
+  const auto cols = static_cast<uint64_t>(kChannels * digits * capacity);
   const uint64_t of_thread =
-      sums_size(capacity) * sizeof(int64_t) +
+      sums_size(capacity, digits) * sizeof(int64_t) +
       (shape.is_shared()
            ? SharedChromaProducts::bytes(shape, std::min(kRowSnapshots, capacity), capacity)
            : 0);
@@ -50,13 +52,17 @@ uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape)
 }
 
 SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
-    : by_slot_(IntegerMatrix::Zero(kChannels * capacity, kChannels * capacity)),
-      pool_(pool),
-      kernel_(kernel),
-      has_sums_(threads()) {
-  const auto cols = static_cast<size_t>(kChannels * capacity);
-  planes_.reserve(cols);
-  sums_size_ = sums_size(capacity);
+    : SlidingGram(capacity, pool, kernel, 0) {}
+
+SlidingGram::SlidingGram(int capacity, int low_bits, Pool* pool, const Kernel& kernel)
+    : SlidingGram(capacity, pool, kernel, low_bits) {}
+
+SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel, int low_bits)
+    : low_bits_(low_bits), pool_(pool), kernel_(kernel), has_sums_(threads()) {
+  const int cols = planes_of_each() * capacity;
+  by_slot_ = IntegerMatrix::Zero(cols, cols);
+  planes_.reserve(static_cast<size_t>(cols));
+  sums_size_ = sums_size(capacity, planes_of_each() / kChannels);
   // Without touching it.
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * has_sums_.size());
 }
@@ -78,25 +84,28 @@ void SlidingGram::make_room() {
   if (threads() <= has_sums_.size()) return;
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * threads());
   has_sums_.assign(threads(), 0);
-  const int capacity = static_cast<int>(by_slot_.rows() / kChannels);
+  const int capacity = static_cast<int>(by_slot_.rows() / planes_of_each());
   while (shape_.is_shared() && shared_.size() < threads())
     shared_.emplace_back(shape_, kernel_, std::min(kRowSnapshots, capacity), capacity);
 }
 
 void SlidingGram::list_planes(const SnapshotRange& span) {
   planes_.clear();
-  for (int t = 0; t < span.size(); ++t)
+  for (int t = 0; t < span.size(); ++t) {
     for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
+    for (int c = 0; low_bits_ > 0 && c < kChannels; ++c) planes_.push_back(span.low_plane(t, c));
+  }
 }
 
-void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
+void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length,
+                            bool begins) {
   make_room();
   list_planes(span);
   // Each snapshot needs those up to itself only: what comes after is the mirror image.
   for (int start = span.size() - count; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
     multiply(end - start, end, first, length);
-    store(span, start, end, first == 0);
+    store(span, start, end, begins);
   }
 }
 
@@ -114,8 +123,8 @@ int64_t* SlidingGram::sums_of(size_t thread, int row_snapshots, int col_snapshot
   int64_t* sums = sums_.get() + thread * sums_size_;
   if (!has_sums_[thread])
     std::fill_n(sums,
-                static_cast<size_t>(kChannels * row_snapshots) *
-                    static_cast<size_t>(kChannels * col_snapshots),
+                static_cast<size_t>(planes_of_each() * row_snapshots) *
+                    static_cast<size_t>(planes_of_each() * col_snapshots),
                 int64_t{0});
   has_sums_[thread] = true;
   return sums;
@@ -147,8 +156,8 @@ void SlidingGram::multiply_rows(int row_snapshots, int col_snapshots, int first,
 
 // Leaves the sums of the threads that took part.
 void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, size_t length) {
-  const auto row_count = static_cast<size_t>(kChannels * row_snapshots);
-  const auto col_count = static_cast<size_t>(kChannels * col_snapshots);
+  const auto row_count = static_cast<size_t>(planes_of_each() * row_snapshots);
+  const auto col_count = static_cast<size_t>(planes_of_each() * col_snapshots);
   const auto add = [&](size_t start, size_t end, size_t thread) {
     int64_t* sums = sums_of(thread, row_snapshots, col_snapshots);
     kernel_.add_dot_products(planes_.data() + col_count - row_count, row_count, planes_.data(),
@@ -171,17 +180,18 @@ void SlidingGram::multiply(int row_snapshots, int col_snapshots, size_t first, s
 
 // Snapshots start .. end - 1 of `span` were the rows, those up to end the columns.
 void SlidingGram::store(const SnapshotRange& span, int start, int end, bool fresh) {
-  const Eigen::Index row_count = kChannels * (end - start);
+  const int planes = planes_of_each();
+  const Eigen::Index row_count = planes * (end - start);
   for (size_t thread = 0; thread < has_sums_.size(); ++thread) {
     if (!has_sums_[thread]) continue;
     const int64_t* sums = sums_.get() + thread * sums_size_;
     for (int t = 0; t < end; ++t)
-      for (int c = 0; c < kChannels; ++c, sums += row_count) {
-        auto column = by_slot_.col(kChannels * span.slot(t) + c);
+      for (int c = 0; c < planes; ++c, sums += row_count) {
+        auto column = by_slot_.col(planes * span.slot(t) + c);
         for (int row = start; row < end; ++row) {
-          auto products = column.segment<kChannels>(kChannels * span.slot(row));
-          const Eigen::Map<const Eigen::Matrix<int64_t, kChannels, 1>> sum(
-              sums + kChannels * (row - start));
+          auto products = column.segment(planes * span.slot(row), planes);
+          const Eigen::Map<const Eigen::Matrix<int64_t, Eigen::Dynamic, 1>> sum(
+              sums + planes * (row - start), planes);
           if (fresh)
             products = sum;
           else
@@ -192,16 +202,46 @@ void SlidingGram::store(const SnapshotRange& span, int start, int end, bool fres
   }
 }
 
+// Of the whole samples of two slots, 3 x 3.
+SlidingGram::Block SlidingGram::joined(int row_slot, int col_slot) const {
+  const int planes = planes_of_each();
+  const auto of = [&](int row_digit, int col_digit) {
+    return by_slot_.block<kChannels, kChannels>(planes * row_slot + kChannels * row_digit,
+                                                planes * col_slot + kChannels * col_digit);
+  };
+  if (low_bits_ == 0) return of(0, 0);
+  const int64_t unit = int64_t{1} << low_bits_;
+  return of(0, 0) * (unit * unit) + (of(0, 1) + of(1, 0)) * unit + of(1, 1);
+}
+
 IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
   const int size = snapshots.size();
   IntegerMatrix gram(kChannels * size, kChannels * size);
   for (int t = 0; t < size; ++t)
     for (int s = 0; s <= t; ++s) {
-      const auto block = by_slot_.block<kChannels, kChannels>(kChannels * snapshots.slot(t),
-                                                              kChannels * snapshots.slot(s));
+      const Block block = joined(snapshots.slot(t), snapshots.slot(s));
       gram.block<kChannels, kChannels>(kChannels * t, kChannels * s) = block;
       gram.block<kChannels, kChannels>(kChannels * s, kChannels * t) = block.transpose();
     }
+  return gram;
+}
+
+IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots, Team* team) const {
+  IntegerMatrix gram = matrix(snapshots);
+  if (!team) return gram;
+  // What lies above the diagonal is the mirror image. A snapshot at a time: there is no second
+  // matrix.
+  const Eigen::Index size = gram.cols();
+  std::vector<int64_t> values(static_cast<size_t>(kChannels * size));
+  for (Eigen::Index t = 0; t < size; t += kChannels) {
+    const Eigen::Index below = size - t;
+    const auto block = std::span(values).first(static_cast<size_t>(kChannels * below));
+    Eigen::Map<IntegerMatrix> sums(block.data(), below, kChannels);
+    sums = gram.block(t, t, below, kChannels);
+    team->sum(Talk::products, block);
+    gram.block(t, t, below, kChannels) = sums;
+    gram.block(t, t, kChannels, below) = sums.transpose();
+  }
   return gram;
 }
 

@@ -9,6 +9,7 @@
 #include "core/gram/shared_chroma.h"
 #include "core/gram/window.h"
 #include "core/parallel/pool.h"
+#include "core/parallel/team.h"
 #include "core/quaternion/matrix.h"
 
 namespace qdmd {
@@ -29,8 +30,13 @@ class SlidingGram {
   // Of frames whose chroma has shared samples: for add_rows().
   SlidingGram(int capacity, const ChromaShape& shape, Pool* pool = nullptr,
               const Kernel& kernel = kernels().front());
-  // What SlidingGram(capacity, shape) takes with a pool of so many threads.
-  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {});
+  // Of snapshots with so many low bits (SnapshotRange::with_low), 1 to 8: matrix() has the inner
+  // products of the whole samples, in units of their lowest bit. Products of high and low digits
+  // are kept apart: four times the products and the memory. For add_slice().
+  SlidingGram(int capacity, int low_bits, Pool* pool, const Kernel& kernel = kernels().front());
+  // What SlidingGram(capacity, shape) takes with a pool of so many threads; or the one of samples
+  // with so many digits, 1 or 2.
+  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {}, int digits = 1);
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read
@@ -42,16 +48,27 @@ class SlidingGram {
   // that begins at pixel 0 comes first and forgets the group's old products; the others follow in
   // any order and size. The group's elements of matrix() are valid once its slices have covered
   // every pixel once. Between slices, other frames may be appended.
-  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length);
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
+    add_slice(span, count, first, length, first == 0);
+  }
+  // The same of planes of which another pixel is the first that counts. begins: that slice does.
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length, bool begins);
   // The same for snapshots of the shape, as far as the pixels of chroma rows first .. first + count
   // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
   void add_rows(const SnapshotRange& span, int frames, int first, int count);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;
+  // Summed over all members of a team, whose planes have the other pixels; null: there are none.
+  IntegerMatrix matrix(const SnapshotRange& snapshots, Team* team) const;
 
  private:
+  SlidingGram(int capacity, Pool* pool, const Kernel& kernel, int low_bits);
   size_t threads() const { return pool_ ? pool_->threads() : 1; }
+  // Of a snapshot.
+  int planes_of_each() const { return low_bits_ > 0 ? 2 * kChannels : kChannels; }
+  using Block = Eigen::Matrix<int64_t, kChannels, kChannels>;
+  Block joined(int row_slot, int col_slot) const;
   void make_room();
   void list_planes(const SnapshotRange& span);
   // Sums of a thread for a call with so many rows and columns, zeros the first time.
@@ -60,8 +77,10 @@ class SlidingGram {
   void multiply_rows(int row_snapshots, int col_snapshots, int first, int count);
   void store(const SnapshotRange& span, int start, int end, bool fresh);
 
-  // Row 3 s + c has the products of slot s's channel c with the planes of its time and before.
+  // Row k s + c has the products of slot s's plane c, of k = planes_of_each(), with the planes of
+  // its time and before. Planes are the channels, then their low digits.
   IntegerMatrix by_slot_;
+  int low_bits_ = 0;
   Pool* pool_ = nullptr;
   Kernel kernel_ = kernels().front();
   std::vector<const uint8_t*> planes_;  // of a call's span, in time order

@@ -136,16 +136,37 @@ class SnapshotRange {
     range.size_ = (size_ + stride - 1) / stride;
     return range;
   }
-  // What `planes`, of the same capacity, have in the same slots.
+  // What `planes`, of the same capacity, have in the same slots. Without low digits.
   SnapshotRange in(const PlaneSlots& planes) const {
     SnapshotRange range = *this;
     range.planes_ = &planes;
+    range.low_ = nullptr;
     return range;
   }
 
+  // Samples of more than 8 bits: those of plane() are their highest 8, and the `bits` bits below
+  // them are in the same slots of `low`, a byte each.
+  SnapshotRange with_low(const PlaneSlots& low, int bits) const {
+    SnapshotRange range = *this;
+    range.low_ = bits > 0 ? &low : nullptr;
+    range.low_bits_ = bits;
+    return range;
+  }
+  // 0: samples have 8 bits.
+  int low_bits() const { return low_ ? low_bits_ : 0; }
+  // Where low_bits() is not 0.
+  const uint8_t* low_plane(int index, int channel) const {
+    return low_->plane(slot(index), channel);
+  }
+  // In units of its lowest bit.
+  double sample(int index, int channel, size_t pixel) const {
+    const int high = plane(index, channel)[pixel];
+    return low_ ? (high << low_bits_) + low_plane(index, channel)[pixel] : high;
+  }
+
  private:
-  const PlaneSlots* planes_;
-  int first_slot_, size_, stride_ = 1;
+  const PlaneSlots *planes_, *low_ = nullptr;
+  int first_slot_, size_, stride_ = 1, low_bits_ = 0;
 };
 
 }  // namespace qdmd

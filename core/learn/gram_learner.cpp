@@ -21,12 +21,24 @@ constexpr size_t kUnit = BackgroundModel::kSliceUnit;
 // Pixels of all snapshots that are spread at once: they stay in the second-level cache.
 constexpr size_t kRun = 1024;
 
+// Of samples in units of 1 / 2^low_bits levels, in levels. Sensitivity is a ratio.
+void put_in_levels(int low_bits, DmdSummary* summary) {
+  if (low_bits == 0) return;
+  const double unit = 1.0 / (1 << low_bits);
+  summary->rounding_bound *= unit;
+  if (!summary->spectrum) return;
+  auto spectrum = *summary->spectrum;
+  for (SpectrumMode& mode : spectrum) mode.amplitude *= unit;
+  summary->spectrum = std::make_shared<const std::vector<SpectrumMode>>(std::move(spectrum));
+}
+
 }  // namespace
 
-GramLearner::GramLearner(const LearnOptions& options, int width, int height)
+GramLearner::GramLearner(const LearnOptions& options, int width, const Band& band)
     : options_(options),
+      band_(band),
       width_(width),
-      height_(height),
+      height_(band.rows()),
       step_(options.sample_step > 0 ? options.sample_step : kChosenStep) {}
 
 uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int threads) const {
@@ -35,12 +47,14 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
-  const double seen = static_cast<double>(sample_count(width_, height_, step_));
-  return SlidingGram::bytes(capacity, threads) +
+  const double seen = pixels_seen();
+  const bool deep = options_.low_bits() > 0;
+  return SlidingGram::bytes(capacity, threads, {}, deep ? 2 : 1) +
          (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
-         (models == Models::one ? 1 : 2) *
-             BackgroundModel::bytes(pixels, window_size, pictures, models == Models::two_of_live);
+         (models == Models::one ? 1 : 2) * BackgroundModel::bytes(pixels, window_size, pictures,
+                                                                  models == Models::two_of_live,
+                                                                  deep);
 }
 
 bool GramLearner::may_read_frames(int window_size) const {
@@ -74,8 +88,12 @@ double GramLearner::solve_seconds(int window_size) const {
 
 uint64_t GramLearner::solver_bytes(int window_size) const {
   if (options_.method == Method::dmd || options_.dmd.solver != Solver::adjoint) return 0;
-  return static_cast<uint64_t>(
-      adjoint_bytes(static_cast<double>(sample_count(width_, height_, step_)), window_size));
+  return static_cast<uint64_t>(adjoint_bytes(pixels_seen(), window_size));
+}
+
+// By the decomposition, those of other members included.
+double GramLearner::pixels_seen() const {
+  return static_cast<double>(sample_count(width_, band_.height(), step_));
 }
 
 void GramLearner::begin(const LearnerRoom& room) {
@@ -83,15 +101,19 @@ void GramLearner::begin(const LearnerRoom& room) {
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   const int capacity = room.frames->capacity();
-  gram_ = shares_chroma() ? SlidingGram(capacity, room.frames->window().shape(), room.pool)
-                          : SlidingGram(capacity, room.pool);
+  if (options_.low_bits() > 0)
+    gram_ = SlidingGram(capacity, options_.low_bits(), room.pool);
+  else if (shares_chroma())
+    gram_ = SlidingGram(capacity, room.frames->window().shape(), room.pool);
+  else
+    gram_ = SlidingGram(capacity, room.pool);
 }
 
 // What the decomposition sees has samples that pixels share.
 bool GramLearner::shares_chroma() const { return room_.frames->samples().shape().is_shared(); }
 
 SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
-  return snapshots.in(room_.frames->samples());
+  return room_.frames->whole_samples(snapshots);
 }
 
 void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
@@ -105,8 +127,17 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
       gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
     return;
   }
-  gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
-                  slice.size(columns.plane_size(), kUnit));
+  if (band_.is_whole()) {
+    gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
+                    slice.size(columns.plane_size(), kUnit));
+    return;
+  }
+  // Other members answer for the rows around.
+  const auto row = static_cast<size_t>(width_);
+  const size_t before = step_ > 1 ? 0 : static_cast<size_t>(band_.own_begin()) * row;
+  const size_t own = step_ > 1 ? columns.pixels() : static_cast<size_t>(band_.own_rows()) * row;
+  gram_.add_slice(columns, frames, before + slice.first(own, kUnit), slice.size(own, kUnit),
+                  slice.index == 0);
 }
 
 void GramLearner::decompose(const SnapshotRange& snapshots) {
@@ -117,10 +148,12 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
     const SnapshotRange columns = columns_of(snapshots);
     Decomposition decomposition =
         options_.method == Method::dmd
-            ? decompose_channels(gram_.matrix(columns), options_.dmd)
-            : qdmd::decompose(columns, gram_.matrix(columns), options_.dmd);
+            ? decompose_channels(gram_.matrix(columns, band_.team()), options_.dmd)
+            : qdmd::decompose(columns, gram_.matrix(columns, band_.team()), options_.dmd,
+                              pixels_seen());
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
+    put_in_levels(options_.low_bits(), &decomposed_.dmd);
     background_ = std::move(decomposition.background);
   }
   decomposed_.window_frames = snapshots.size();
@@ -128,7 +161,7 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
   decomposed_.gram_time = products - products_told_;
   decomposed_.solve_time = room_.clock->spent().of(Clock::solving) - before;
   products_told_ = products;
-  snapshots_ = snapshots;
+  snapshots_ = room_.frames->whole(snapshots);
 }
 
 void GramLearner::build(Slice slice, BackgroundModel* model) {

@@ -13,9 +13,9 @@ namespace qdmd {
 // 1 on their Gram matrix, then the modes' pictures.
 class GramLearner : public Learner {
  public:
-  GramLearner(const LearnOptions& options, int width, int height);
+  GramLearner(const LearnOptions& options, int width, const Band& band);
 
-  FrameContents contents() const override { return {step_, 0}; }
+  FrameContents contents() const override { return {step_, 0, 1, 1, options_.low_bits()}; }
   std::vector<int> sample_steps() const override { return {step_}; }
   bool in_one_piece() const override { return false; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
@@ -34,8 +34,10 @@ class GramLearner : public Learner {
   void build_spread(size_t first, size_t length, int parts, BackgroundModel* model);
   // What the decomposition sees of them.
   SnapshotRange columns_of(const SnapshotRange& snapshots) const;
+  double pixels_seen() const;
 
   LearnOptions options_;
+  Band band_;
   int width_, height_, step_;
   LearnerRoom room_ = {};
   SlidingGram gram_;

@@ -12,6 +12,7 @@
 #include "core/learn/method.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
+#include "core/parallel/band.h"
 #include "core/parallel/pool.h"
 #include "core/passes/bands.h"
 
@@ -54,8 +55,9 @@ struct LearnerRoom {
 // May throw std::bad_alloc; what was under way is lost then.
 class Learner {
  public:
-  // That of options.method, for frames of width x height pixels. Takes no memory for them yet.
-  static std::unique_ptr<Learner> make(const LearnOptions& options, int width, int height);
+  // That of options.method, for frames of that width and a band of their rows. Takes no memory for
+  // them yet.
+  static std::unique_ptr<Learner> make(const LearnOptions& options, int width, const Band& band);
   virtual ~Learner() = default;
 
   // ---- What it needs ----

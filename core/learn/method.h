@@ -19,7 +19,12 @@ struct LearnOptions {
   int iterations = 1;  // of Method::robust, 1 .. kMaxIterations
   // The decomposition sees every k-th pixel in x and y, up to kMaxSampleStep; 0: chosen.
   int sample_step = 0;
+  // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
+  bool remembers = true;
+  int depth = 8;  // bits of the frames' samples, 8 to 16
 
+  static constexpr int kMostDepth = 16;
+  int low_bits() const { return depth - 8; }
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
 };
 

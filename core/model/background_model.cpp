@@ -8,14 +8,20 @@
 namespace qdmd {
 namespace {
 
-// rows x J to the order that combine_planes reads.
+// rows x J to the order that combine_planes reads. With low digits, of that unit, the planes are
+// twice as many.
 template <typename Matrix>
-void group_by_four(const Matrix& rows, std::vector<double>* out) {
-  const Eigen::Index groups = (rows.rows() + 3) / 4;
-  out->assign(static_cast<size_t>(groups * 4 * rows.cols()), 0.0);
+void group_by_four(const Matrix& rows, bool low, double unit, std::vector<double>* out) {
+  const Eigen::Index groups = (rows.rows() + 3) / 4, cols = (low ? 2 : 1) * rows.cols();
+  out->assign(static_cast<size_t>(groups * 4 * cols), 0.0);
+  const auto at = [&](Eigen::Index k, Eigen::Index j) -> double& {
+    return (*out)[static_cast<size_t>(4 * ((k / 4) * cols + j) + k % 4)];
+  };
   for (Eigen::Index k = 0; k < rows.rows(); ++k)
-    for (Eigen::Index j = 0; j < rows.cols(); ++j)
-      (*out)[static_cast<size_t>(4 * ((k / 4) * rows.cols() + j) + k % 4)] = rows(k, j);
+    for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+      at(k, j) = rows(k, j);
+      if (low) at(k, rows.cols() + j) = unit * rows(k, j);
+    }
 }
 
 constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -25,15 +31,16 @@ std::atomic<uint64_t> pictures_shown{0};
 
 }  // namespace
 
-uint64_t BackgroundModel::bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures) {
+uint64_t BackgroundModel::bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures,
+                                bool deep) {
   // More pictures than this are not made; what is frozen has three.
   const int direct_above = kChannels * snapshots / static_cast<int>(sizeof(float));
   const int made = keep_pictures || pictures <= direct_above ? std::max(pictures, kChannels)
                                                              : std::max(direct_above, kChannels);
   const auto planes = static_cast<uint64_t>(kChannels) * static_cast<uint64_t>(snapshots);
   // The pictures, their basis twice (as it is, and as combine_planes() reads it), and the planes.
-  return sizeof(float) * static_cast<uint64_t>(made) * pixels +
-         planes * (2 * sizeof(double) * static_cast<uint64_t>(made + 3) + sizeof(uint8_t*));
+  const uint64_t of_plane = 2 * sizeof(double) * static_cast<uint64_t>(made + 3) + sizeof(uint8_t*);
+  return sizeof(float) * static_cast<uint64_t>(made) * pixels + (deep ? 2 : 1) * planes * of_plane;
 }
 
 void BackgroundModel::make_pictures(size_t count) {
@@ -48,7 +55,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   model_ = TemporalModel(model);
   basis_ = model.basis();
   pixels_ = snapshots.pixels();
-  largest_ = 255 * basis_.cwiseAbs().rowwise().sum();
+  largest_ = Eigen::VectorXd(255 * basis_.cwiseAbs().rowwise().sum());
   frozen_ = steady_ = false;
   change();
   stride_ = 1;
@@ -57,6 +64,9 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   planes_.clear();
   for (int t = 0; t < snapshots.size(); ++t)
     for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
+  snapshot_planes_ = planes_.size();
+  for (int t = 0; snapshots.low_bits() > 0 && t < snapshots.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.low_plane(t, c));
   const auto pictures = static_cast<size_t>(basis_.rows());
   direct_ =
       !keep_pictures && may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
@@ -67,20 +77,33 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
     samples_.reserve(room);
   }
   make_pictures(direct_ ? 0 : pictures);
-  if (!direct_) group_by_four(basis_, &coefficients_);
+  if (!direct_) group(basis_);
+}
+
+void BackgroundModel::group(const Eigen::MatrixXd& rows) {
+  group_by_four(rows, planes_.size() > snapshot_planes_, 1.0 / (1 << low_bits_), &coefficients_);
 }
 
 void BackgroundModel::build_slice(size_t first, size_t count) {
-  if (!direct_) combine_runs(planes_.data(), first, first, count);
+  if (!direct_) combine_runs(planes_.data(), planes_.size(), first, first, count);
 }
 
 void BackgroundModel::build_from(const uint8_t* const* planes, size_t first, size_t count) {
-  combine_runs(planes, 0, first, count);
+  combine_runs(planes, snapshot_planes_, 0, first, count);
+}
+
+void BackgroundModel::build_from(const uint16_t* const* planes, size_t first, size_t count) {
+  combine_runs(planes, snapshot_planes_, 0, first, count);
+  // In levels: a power of two, which rounds nothing.
+  const float unit = 1.0f / static_cast<float>(1 << low_bits_);
+  for (float* picture : pictures_)
+    for (size_t p = first; p < first + count; ++p) picture[p] *= unit;
 }
 
 // planes[j][from] is the first sample of pixel `first`.
-void BackgroundModel::combine_runs(const uint8_t* const* planes, size_t from, size_t first,
-                                   size_t count) {
+template <typename T>
+void BackgroundModel::combine_runs(const T* const* planes, size_t plane_count, size_t from,
+                                   size_t first, size_t count) {
   // Short runs, whose samples of all planes stay in the second-level cache for every group of
   // pictures.
   constexpr size_t kRun = 256;
@@ -89,7 +112,7 @@ void BackgroundModel::combine_runs(const uint8_t* const* planes, size_t from, si
     for (size_t k = 0; k < picture_count(); k += 4) {
       const size_t group = std::min<size_t>(4, picture_count() - k);
       for (size_t i = 0; i < group; ++i) sums[i] = pictures_[k + i] + first + done;
-      combine_planes(coefficients_.data() + k * planes_.size(), group, planes, planes_.size(),
+      combine_planes(coefficients_.data() + k * plane_count, group, planes, plane_count,
                      from + done, std::min(kRun, count - done), sums.data());
     }
 }
@@ -125,7 +148,8 @@ void BackgroundModel::take_weights(const float* weights, size_t count) {
 void BackgroundModel::use_steady_weights(double t) {
   const double middle = (std::floor(t / kSteadyFrames) + 0.5) * kSteadyFrames;
   model_.weights(middle / stride_, &steady_weights_);
-  const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs() * largest_;
+  // Lazy products take no memory.
+  const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs().lazyProduct(largest_);
   if (moved.maxCoeff() < kSteadyLevels) time_weights_ = steady_weights_;
 }
 
@@ -150,29 +174,53 @@ void BackgroundModel::set_time(double t) {
     if (direct_weights_.cols() != basis_.cols())
       direct_weights_ = Eigen::MatrixXd(kChannels, basis_.cols());
     direct_weights_.noalias() = time_weights_ * basis_;
-    group_by_four(direct_weights_, &coefficients_);
+    group(direct_weights_);
     change();
     return;
   }
-  // In the order of weights_.
-  single_weights_ = time_weights_.transpose().cast<float>();
-  take_weights(single_weights_.data(), static_cast<size_t>(single_weights_.size()));
+  const auto pictures = static_cast<Eigen::Index>(picture_count());
+  single_weights_.resize(kChannels * picture_count());
+  Eigen::Map<Eigen::MatrixXf>(single_weights_.data(), pictures, kChannels) =
+      time_weights_.transpose().cast<float>();
+  take_weights(single_weights_.data(), single_weights_.size());
 }
 
 void BackgroundModel::combine_directly(size_t first, size_t count, float* const* out) const {
   combine_planes(coefficients_.data(), 3, planes_.data(), planes_.size(), first, count, out);
 }
 
-void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
+// evaluate(weights, pictures, how many there are, first): from the model's pictures, or from L(t)
+// where the combination is direct.
+template <typename Evaluate>
+void BackgroundModel::evaluate_with(size_t first, const Evaluate& evaluate, size_t count) const {
   if (!direct_) {
-    levels_of(weights_.data(), pictures_.data(), picture_count(), first, count, out);
+    evaluate(weights_.data(), pictures_.data(), picture_count(), first);
     return;
   }
   std::array<std::array<float, kMaxRun + kSliceUnit>, 3> sums;
   float* const rows[3] = {sums[0].data(), sums[1].data(), sums[2].data()};
   const size_t offset = first % kSliceUnit;
   combine_directly(first - offset, count + offset, rows);
-  levels_of(kIdentity.data(), rows, 3, offset, count, out);
+  evaluate(kIdentity.data(), rows, size_t{3}, offset);
+}
+
+void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
+  const auto levels = low_bits_ > 0 ? high_digits_of : levels_of;
+  evaluate_with(
+      first,
+      [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
+        levels(weights, pictures, number, at, count, out);
+      },
+      count);
+}
+
+void BackgroundModel::evaluate_deep(size_t first, size_t count, uint16_t* const out[3]) const {
+  evaluate_with(
+      first,
+      [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
+        deep_levels_of(weights, pictures, number, low_bits_, at, count, out);
+      },
+      count);
 }
 
 void BackgroundModel::freeze_at(double t) {
@@ -208,11 +256,6 @@ void BackgroundModel::freeze_but_for_light(double t) {
   gains_.swap(gains);
 }
 
-void BackgroundModel::replace(size_t first, size_t count, const uint8_t* const level[3]) {
-  for (size_t c = 0; c < kChannels; ++c) std::copy_n(level[c], count, pictures_[c] + first);
-  change();
-}
-
 void BackgroundModel::make_room(size_t pixels, bool limits) {
   weights_.reserve(kIdentity.size());
   pictures_.reserve(kChannels);
@@ -228,7 +271,11 @@ void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
                                 const std::vector<uint8_t>* limits, size_t pixels) {
   pixels_ = pixels;
   make_pictures(kChannels);
-  for (size_t c = 0; c < kChannels; ++c) std::copy(level[c].begin(), level[c].end(), pictures_[c]);
+  // Nobody knows the low digits: the middle of what they can be.
+  const float middle = low_bits_ > 0 ? 0.5f : 0;
+  for (size_t c = 0; c < kChannels; ++c)
+    std::transform(level[c].begin(), level[c].end(), pictures_[c],
+                   [middle](uint8_t sample) { return static_cast<float>(sample) + middle; });
   if (limits)
     limits_ = *limits;
   else

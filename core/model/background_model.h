@@ -17,6 +17,11 @@ namespace qdmd {
 // frames are then combined directly, at 9 m products per pixel.
 class BackgroundModel {
  public:
+  // Of samples with so many bits below their highest eight (SnapshotRange::with_low), 0 to 8: L is
+  // in levels of the highest eight all the same, and evaluate_deep() knows more of it. Before all
+  // others.
+  void set_low_bits(int bits) { low_bits_ = bits; }
+
   // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
   // direct, until the next build.
   void build(const SnapshotRange& snapshots, const TemporalModel& model);
@@ -30,6 +35,8 @@ class BackgroundModel {
   // A slice from other samples than the snapshots': planes[j] begins with pixel `first` and can be
   // read up to the next multiple of 64 samples. Not where the combination is direct.
   void build_from(const uint8_t* const* planes, size_t first, size_t count);
+  // The same of whole samples, in units of their lowest bit.
+  void build_from(const uint16_t* const* planes, size_t first, size_t count);
   // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
   void set_stride(int frames) { stride_ = frames; }
   // Frames of one block of kSteadyFrames share the weights of its middle, if this moves no pixel of
@@ -56,7 +63,8 @@ class BackgroundModel {
 
   // The bytes that a model of a window of `snapshots` takes with up to so many pictures of modes,
   // without limits.
-  static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures);
+  static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures,
+                        bool deep = false);
 
   // True where so many pictures of modes would take more memory than their window.
   static bool may_combine_directly(int pictures, int snapshots) {
@@ -84,23 +92,34 @@ class BackgroundModel {
   void make_room(size_t pixels, bool limits);
 
   // Only while frozen: sets pixels first .. first + count - 1 of L to these levels, in unit light.
-  void replace(size_t first, size_t count, const uint8_t* const level[3]);
+  template <typename Level>
+  void replace(size_t first, size_t count, const Level* const level[3]) {
+    for (size_t c = 0; c < kChannels; ++c) std::copy_n(level[c], count, pictures_[c] + first);
+    change();
+  }
 
   // Sets the time of the following calls, in frames from the solved window's first snapshot.
   void set_time(double t);
   // As long as this is the same, L is, at all pixels; no two models' are the same.
   uint64_t picture() const { return picture_; }
   // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one
-  // array a channel. count <= kMaxRun.
+  // array a channel. count <= kMaxRun. Of samples with low bits its high digit, as frames have it.
   void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
+  // The same in units of the lowest bit, rounded.
+  void evaluate_deep(size_t first, size_t count, uint16_t* const out[3]) const;
 
  private:
   size_t picture_count() const { return pictures_.size(); }
   // The same before rounding, at a `first` that is a multiple of kSliceUnit, where the combination
   // is direct.
   void combine_directly(size_t first, size_t count, float* const* out) const;
-  void combine_runs(const uint8_t* const* planes, size_t from, size_t first, size_t count);
+  template <typename T>
+  void combine_runs(const T* const* planes, size_t plane_count, size_t from, size_t first,
+                    size_t count);
+  template <typename Evaluate>
+  void evaluate_with(size_t first, const Evaluate& evaluate, size_t count) const;
   void make_pictures(size_t count);
+  void group(const Eigen::MatrixXd& rows);
   void take_weights(const float* weights, size_t count);
   void use_steady_weights(double t);
   // L is another picture from now on.
@@ -109,13 +128,15 @@ class BackgroundModel {
   TemporalModel model_;
   Eigen::MatrixXd basis_, time_weights_, direct_weights_;
   Eigen::MatrixXd steady_weights_;
-  Eigen::MatrixXf single_weights_;  // K x 3
-  Eigen::VectorXd largest_;         // that a picture has at a pixel, in levels: bounds
+  std::vector<float> single_weights_;  // of one time, as weights_
+  Eigen::VectorXd largest_;            // that a picture has at a pixel, in levels: bounds
   bool direct_ = false, frozen_ = false, steady_ = false;
   uint64_t picture_ = 0;
-  int stride_ = 1;
+  int stride_ = 1, low_bits_ = 0;
+  size_t snapshot_planes_ = 0;  // channels of all snapshots, without low digits
   size_t pixels_ = 0;
-  std::vector<const uint8_t*> planes_;  // of the snapshots, in time order
+  // Of the snapshots, in time order; and then their low digits.
+  std::vector<const uint8_t*> planes_;
   std::vector<double>
       coefficients_;            // of the pictures, or of L(t) where direct_, for combine_planes
   std::vector<float> samples_;  // of the pictures, one after another

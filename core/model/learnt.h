@@ -13,23 +13,25 @@ namespace qdmd {
 // belongs to.
 enum class Colours : uint8_t { rgb, yuv, grey };
 
+// Of method=robust: what a window leaves to the next. Planes have width * height samples.
+struct LearntEarlier {
+  std::vector<uint8_t> level[kChannels], spread;
+  // By the cells of a grid.
+  int rows = 0, cols = 0;
+  std::vector<float> weight, limit;
+};
+
 // A background in use with its statistics, and what windows to come are told of it. Planes have
 // width * height samples.
 struct Learnt {
-  // Of method=robust: what a window leaves to the next.
-  struct Earlier {
-    std::vector<uint8_t> level[kChannels], spread;
-    // By the cells of a grid.
-    int rows = 0, cols = 0;
-    std::vector<float> weight, limit;
-  };
+  using EarlierWindow = LearntEarlier;
 
   int width = 0, height = 0;
   Colours colours = Colours::rgb;
   std::vector<uint8_t> level[kChannels];  // L as it was shown
   std::vector<uint8_t> limits;            // BackgroundModel::limits(), or empty
   double noise = 0;                       // ForegroundStatistics::noise
-  std::optional<Earlier> earlier;
+  std::optional<EarlierWindow> earlier;
 };
 
 }  // namespace qdmd

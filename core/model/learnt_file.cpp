@@ -194,7 +194,7 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
   for (auto& level : read.level) level = reader.plane(pixels);
   if (header.sections & kHasLimits) read.limits = reader.plane(pixels);
   if (header.sections & kHasEarlier) {
-    Learnt::Earlier& earlier = read.earlier.emplace();
+    Learnt::EarlierWindow& earlier = read.earlier.emplace();
     for (auto& level : earlier.level) level = reader.plane(pixels);
     earlier.spread = reader.plane(pixels);
     earlier.rows = static_cast<int>(header.rows);

@@ -12,8 +12,12 @@ int Workers::count(int threads) {
       std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, unsigned{kMost}));
 }
 
-Workers::Workers(int threads)
-    : threads_(threads), asked_(threads), pool_(count(threads)), side_(may_work_beside(threads)) {}
+Workers::Workers(int threads, bool beside)
+    : threads_(threads),
+      asked_(threads),
+      beside_(beside),
+      pool_(count(threads)),
+      side_(may_work_beside(threads)) {}
 
 void Workers::follow() {
   if (asked_ == threads_ || !side_.idle()) return;
@@ -23,6 +27,6 @@ void Workers::follow() {
 }
 
 // A core that all threads share goes from one to the other: frames pass while a solve goes on.
-bool Workers::may_work_beside(int threads) { return threads != 1; }
+bool Workers::may_work_beside(int threads) const { return beside_ && threads != 1; }
 
 }  // namespace qdmd

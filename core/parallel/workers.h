@@ -16,8 +16,9 @@ class Workers {
   static int count(int threads);
 
   // `threads` <= kMost; 0: one for each core, and even on one core a thread for the work beside the
-  // caller. There are fewer if the system starts no more.
-  explicit Workers(int threads);
+  // caller. There are fewer if the system starts no more. beside: false if nothing may go on beside
+  // the caller, whatever the number.
+  explicit Workers(int threads, bool beside = true);
 
   Pool& pool() { return pool_; }
   SideThread& side() { return side_; }
@@ -29,9 +30,10 @@ class Workers {
   void follow();
 
  private:
-  static bool may_work_beside(int threads);
+  bool may_work_beside(int threads) const;
 
   int threads_, asked_;
+  bool beside_;
   Pool pool_;
   // The last member: it ends before the pool, which it may use.
   SideThread side_;

@@ -21,7 +21,8 @@ struct Sums {
   V a0, a1, b0, b1, c0, c1, e0, e1;
 
   HWY_INLINE void clear() { a0 = a1 = b0 = b1 = c0 = c1 = e0 = e1 = hn::Zero(D()); }
-  HWY_INLINE void add(const double* coefficients, const uint8_t* samples) {
+  template <typename T>
+  HWY_INLINE void add(const double* coefficients, const T* samples) {
     const D d;
     const V x0 = load(samples), x1 = load(samples + hn::Lanes(d));
     const V a = hn::Set(d, coefficients[0]), b = hn::Set(d, coefficients[1]);
@@ -39,10 +40,11 @@ struct Sums {
   }
 
  private:
-  static HWY_INLINE V load(const uint8_t* from) {
+  template <typename T>
+  static HWY_INLINE V load(const T* from) {
     const hn::Rebind<int32_t, D> d32;
-    const hn::Rebind<uint8_t, D> d8;
-    return hn::PromoteTo(D(), hn::PromoteTo(d32, hn::LoadU(d8, from)));
+    const hn::Rebind<T, D> d_samples;
+    return hn::PromoteTo(D(), hn::PromoteTo(d32, hn::LoadU(d_samples, from)));
   }
   static HWY_INLINE void store_one(V x0, V x1, float* to) {
     const hn::Rebind<float, D> d32;
@@ -51,24 +53,35 @@ struct Sums {
   }
 };
 
-template <class D>
+// How sums become samples: times `scale`, plus `bias` (a half: rounded to nearest), at most `top`.
+struct Rounding {
+  float scale, bias, top;
+};
+
+template <class D, typename T>
 size_t level_vectors(const float* weights, const float* const* pictures, size_t picture_count,
-                     size_t p, size_t first, size_t count, uint8_t* const* out) {
+                     const Rounding& rounding, size_t p, size_t first, size_t count,
+                     T* const* out) {
   const D d;
   const hn::Rebind<int32_t, D> d32;
-  const hn::Rebind<uint8_t, D> d8;
+  const hn::Rebind<T, D> d_samples;
   const float* red = weights;
   const float* green = weights + picture_count;
   const float* blue = weights + 2 * picture_count;
   // Adding a half and truncating rounds to nearest in the range that survives the clamp.
-  const auto half = hn::Set(d, 0.5f), zero = hn::Zero(d), top = hn::Set(d, 255.0f);
-  const auto store = [&](hn::Vec<D> sum, uint8_t* to) HWY_ATTR {
+  const auto bias = hn::Set(d, rounding.bias), zero = hn::Zero(d), top = hn::Set(d, rounding.top);
+  const auto scale = hn::Set(d, rounding.scale);
+  const auto store = [&](hn::Vec<D> sum, T* to) HWY_ATTR {
+    if constexpr (sizeof(T) > 1) sum = hn::MulAdd(scale, sum, bias);
     // The comparison sends a NaN (infinity less infinity) to zero.
     const auto positive = hn::IfThenElseZero(hn::Gt(sum, zero), sum);
-    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(d32, hn::Min(positive, top))), d8, to);
+    const auto whole = hn::ConvertTo(d32, hn::Min(positive, top));
+    hn::StoreU(hn::DemoteTo(d_samples, whole), d_samples, to);
   };
+  (void)scale;
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
-    auto r = half, g = half, b = half;
+    // Of bytes the bias comes first, it is one step less.
+    auto r = sizeof(T) > 1 ? zero : bias, g = r, b = r;
     for (size_t k = 0; k < picture_count; ++k) {
       const float* from = pictures[k] + first + p;
       // The next run's: other frames' work has driven it out of the cache, and the hardware
@@ -89,15 +102,16 @@ size_t level_vectors(const float* weights, const float* const* pictures, size_t 
 }  // namespace
 
 // coefficients: four of each plane. used: how many of the four sums somebody takes.
-void combine_four(const double* coefficients, const uint8_t* const* planes, size_t plane_count,
-                  size_t first, size_t count, size_t used, float* const* sums) {
+template <typename T>
+HWY_INLINE void combine(const double* coefficients, const T* const* planes, size_t plane_count,
+                        size_t first, size_t count, size_t used, float* const* sums) {
   using D = hn::ScalableTag<double>;
   const size_t lanes = hn::Lanes(D()), block = 4 * lanes;
   for (size_t p = 0; p < count; p += block) {
     Sums<D> low, high;
     low.clear(), high.clear();
     for (size_t j = 0; j < plane_count; ++j) {
-      const uint8_t* from = planes[j] + first + p;
+      const T* from = planes[j] + first + p;
       // The planes are too many streams for the hardware to foresee.
       hwy::Prefetch(from + 256);
       low.add(coefficients + 4 * j, from);
@@ -116,13 +130,35 @@ void combine_four(const double* coefficients, const uint8_t* const* planes, size
   }
 }
 
+void combine_four(const double* coefficients, const uint8_t* const* planes, size_t plane_count,
+                  size_t first, size_t count, size_t used, float* const* sums) {
+  combine(coefficients, planes, plane_count, first, count, used, sums);
+}
+void combine_four_deep(const double* coefficients, const uint16_t* const* planes,
+                       size_t plane_count, size_t first, size_t count, size_t used,
+                       float* const* sums) {
+  combine(coefficients, planes, plane_count, first, count, used, sums);
+}
+
 // Pixels that fill no vector take the same steps one by one, so that a pixel's bits do not depend
 // on where a run begins.
-void levels(const float* weights, const float* const* pictures, size_t picture_count, size_t first,
-            size_t count, uint8_t* const* out) {
-  const size_t p =
-      level_vectors<hn::ScalableTag<float>>(weights, pictures, picture_count, 0, first, count, out);
-  level_vectors<hn::CappedTag<float, 1>>(weights, pictures, picture_count, p, first, count, out);
+template <typename T>
+HWY_INLINE void all_levels(const float* weights, const float* const* pictures, size_t picture_count,
+                           const Rounding& rounding, size_t first, size_t count, T* const* out) {
+  const size_t p = level_vectors<hn::ScalableTag<float>>(weights, pictures, picture_count, rounding,
+                                                         0, first, count, out);
+  level_vectors<hn::CappedTag<float, 1>>(weights, pictures, picture_count, rounding, p, first,
+                                         count, out);
+}
+
+void levels(const float* weights, const float* const* pictures, size_t picture_count, float bias,
+            size_t first, size_t count, uint8_t* const* out) {
+  all_levels(weights, pictures, picture_count, {1, bias, 255}, first, count, out);
+}
+void deep_levels(const float* weights, const float* const* pictures, size_t picture_count,
+                 int low_bits, size_t first, size_t count, uint16_t* const* out) {
+  const auto scale = static_cast<float>(1 << low_bits);
+  all_levels(weights, pictures, picture_count, {scale, 0.5f, 256 * scale - 1}, first, count, out);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -134,7 +170,9 @@ namespace qdmd {
 namespace {
 
 HWY_EXPORT(combine_four);
+HWY_EXPORT(combine_four_deep);
 HWY_EXPORT(levels);
+HWY_EXPORT(deep_levels);
 
 }  // namespace
 
@@ -145,9 +183,27 @@ void combine_planes(const double* coefficients, size_t sum_count, const uint8_t*
    std::min<size_t>(4, sum_count - k), sums + k);
 }
 
+void combine_planes(const double* coefficients, size_t sum_count, const uint16_t* const* planes,
+                    size_t plane_count, size_t first, size_t count, float* const* sums) {
+  for (size_t k = 0; k < sum_count; k += 4) HWY_DYNAMIC_DISPATCH(combine_four_deep)
+  (coefficients + k * plane_count, planes, plane_count, first, count,
+   std::min<size_t>(4, sum_count - k), sums + k);
+}
+
 void levels_of(const float* weights, const float* const* pictures, size_t picture_count,
                size_t first, size_t count, uint8_t* const out[3]) {
-  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, first, count, out);
+  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0.5f, first, count, out);
+}
+
+void high_digits_of(const float* weights, const float* const* pictures, size_t picture_count,
+                    size_t first, size_t count, uint8_t* const out[3]) {
+  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0, first, count, out);
+}
+
+void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
+                    int low_bits, size_t first, size_t count, uint16_t* const out[3]) {
+  HWY_DYNAMIC_DISPATCH(deep_levels)
+  (weights, pictures, picture_count, low_bits, first, count, out);
 }
 
 }  // namespace qdmd

@@ -17,11 +17,20 @@ constexpr size_t kMaxRun = 1024;
 // next multiple of 64 behind the last pixel.
 void combine_planes(const double* coefficients, size_t sum_count, const uint8_t* const* planes,
                     size_t plane_count, size_t first, size_t count, float* const* sums);
+// The same of samples of 16 bits.
+void combine_planes(const double* coefficients, size_t sum_count, const uint16_t* const* planes,
+                    size_t plane_count, size_t first, size_t count, float* const* sums);
 
 // out[c][p] = sum over k < picture_count of weights[c * picture_count + k] * pictures[k][first + p]
 // for c < 3 and p < count <= kMaxRun, in float, rounded to nearest (halves up) and clamped to
 // 0 .. 255; not-a-number gives 0.
 void levels_of(const float* weights, const float* const* pictures, size_t picture_count,
                size_t first, size_t count, uint8_t* const out[3]);
+// The same rounded down.
+void high_digits_of(const float* weights, const float* const* pictures, size_t picture_count,
+                    size_t first, size_t count, uint8_t* const out[3]);
+// The same times 2^low_bits, rounded to nearest and clamped to what 8 + low_bits bits hold.
+void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
+                    int low_bits, size_t first, size_t count, uint16_t* const out[3]);
 
 }  // namespace qdmd

@@ -17,12 +17,13 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Vectors of at most 64 samples: runs are multiples of that.
-using Bytes = hn::CappedTag<uint8_t, 64>;
+template <typename T>
+using Samples = hn::CappedTag<T, 64>;
 
 // keep[i] = 0 where bit i is set, else 255; masked[i] counts the former. `count`: a multiple of 64.
 void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
                  uint16_t* HWY_RESTRICT masked) {
-  const Bytes d;
+  const Samples<uint8_t> d;
   const auto ones = hn::Set(d, 255);
   if (hn::Lanes(d) < 8) {
     for (size_t i = 0; i < count; ++i) keep[i] = (bits[i / 8] >> i % 8 & 1) != 0 ? 0 : 255;
@@ -45,25 +46,46 @@ void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep
   for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor) & keep[i];
 }
 
+// The same of whole samples, whose digits are high and low. next_high, next_low: as above.
+void take_deep_row(const uint8_t* HWY_RESTRICT high, const uint8_t* HWY_RESTRICT low,
+                   const uint8_t* HWY_RESTRICT keep, int low_bits, size_t count, float factor,
+                   const uint8_t* next_high, const uint8_t* next_low, uint16_t* HWY_RESTRICT out) {
+  for (size_t i = 0; i < count; i += 64) {
+    hwy::Prefetch(next_high + i);
+    hwy::Prefetch(next_low + i);
+  }
+  if (factor == 1) {
+    for (size_t i = 0; i < count; ++i)
+      out[i] = static_cast<uint16_t>((high[i] << low_bits | low[i]) & keep[i] * 257);
+    return;
+  }
+  const auto most = static_cast<float>((256 << low_bits) - 1);
+  for (size_t i = 0; i < count; ++i) {
+    const float level = static_cast<float>(high[i] << low_bits | low[i]) * factor + 0.5f;
+    out[i] = static_cast<uint16_t>(static_cast<int>(level < most ? level : most) & keep[i] * 257);
+  }
+}
+
 // The samples of all planes at as many pixels as a vector has, `stride` apart.
+template <typename T>
 struct Column {
-  const uint8_t* samples;
+  const T* samples;
   size_t stride, planes;
 
-  hn::Vec<Bytes> at(size_t t) const { return hn::LoadU(Bytes(), samples + t * stride); }
+  hn::Vec<Samples<T>> at(size_t t) const { return hn::LoadU(Samples<T>(), samples + t * stride); }
 };
 
-// Counts in bytes, as far as these can count: part(t, first, second) adds to them what plane t has.
-// total: of as many as are wanted, 1 or 2.
-template <size_t kCounts, class Part>
+// Counts in samples, as far as bytes can count: part(t, first, second) adds to them what plane t
+// has. total: of as many as are wanted, 1 or 2.
+template <size_t kCounts, typename T, class Part>
 HWY_INLINE void count_samples(size_t planes, uint16_t (*total)[64], Part part) {
-  const Bytes d;
+  const Samples<T> d;
   std::memset(total, 0, kCounts * sizeof(*total));
   for (size_t t = 0; t < planes;) {
     const size_t end = std::min(planes, t + 255);
     auto first = hn::Zero(d), second = hn::Zero(d);
     for (; t < end; ++t) part(t, first, second);
-    HWY_ALIGN uint8_t counted[64];
+    HWY_ALIGN T counted[64];
     hn::Store(first, d, counted);
     for (size_t i = 0; i < hn::Lanes(d); ++i)
       total[0][i] = static_cast<uint16_t>(total[0][i] + counted[i]);
@@ -76,23 +98,24 @@ HWY_INLINE void count_samples(size_t planes, uint16_t (*total)[64], Part part) {
 
 // The median of each pixel's samples that are not masked, the mean of the middle two rounded down
 // where their number is even; 0 where masked. level: near what it is; stays where all are masked.
-// masked: how many are. The median's bits are found from the highest down: a bit is set where no
-// more samples lie below than half. Where the median of no pixel is far from `level`, that begins
-// near it.
-void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
-                 uint8_t* HWY_RESTRICT level) {
-  constexpr int kNear = 8;
-  const Bytes d;
+// masked: how many are. unit: samples of a level. The median's bits are found from the highest
+// down: a bit is set where no more samples lie below than half. Where the median of no pixel is far
+// from `level`, that begins near it.
+template <typename T>
+HWY_INLINE void take_median(const Column<T>& column, const uint16_t* HWY_RESTRICT masked, int unit,
+                            T* HWY_RESTRICT level) {
+  const int near = 8 * unit;
+  const Samples<T> d;
   const size_t lanes = hn::Lanes(d);
-  HWY_ALIGN uint8_t median[64], candidate[64], upper[64];
+  HWY_ALIGN T median[64], candidate[64], upper[64];
   HWY_ALIGN uint16_t below[2][64], rank[64];
   const auto all = static_cast<uint16_t>(column.planes);
   for (size_t i = 0; i < lanes; ++i) {
-    median[i] = static_cast<uint8_t>(std::clamp(level[i] - kNear / 2, 0, 256 - kNear));
+    median[i] = static_cast<T>(std::clamp(level[i] - near / 2, 0, 256 * unit - near));
     rank[i] = static_cast<uint16_t>(masked[i] + std::max(all - masked[i] - 1, 0) / 2);
   }
-  const auto low = hn::Load(d, median), high = hn::Add(low, hn::Set(d, kNear - 1));
-  count_samples<2>(column.planes, below, [&](size_t t, auto& under, auto& up_to) HWY_ATTR {
+  const auto low = hn::Load(d, median), high = hn::Add(low, hn::Set(d, static_cast<T>(near - 1)));
+  count_samples<2, T>(column.planes, below, [&](size_t t, auto& under, auto& up_to) HWY_ATTR {
     const auto x = column.at(t);
     under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(x, low)));
     up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(hn::Gt(x, high))));
@@ -102,10 +125,10 @@ void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
     far |= static_cast<int>(masked[i] != all) &
            (static_cast<int>(below[0][i] > rank[i]) | static_cast<int>(below[1][i] <= rank[i]));
   if (far) std::memset(median, 0, sizeof(median));
-  for (int bit = far ? 128 : kNear / 2; bit > 0; bit /= 2) {
-    for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<uint8_t>(median[i] + bit);
+  for (int bit = far ? 128 * unit : near / 2; bit > 0; bit /= 2) {
+    for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<T>(median[i] + bit);
     const auto limit = hn::Load(d, candidate);
-    count_samples<1>(column.planes, below, [&](size_t t, auto& under, auto&) HWY_ATTR {
+    count_samples<1, T>(column.planes, below, [&](size_t t, auto& under, auto&) HWY_ATTR {
       under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(column.at(t), limit)));
     });
     for (size_t i = 0; i < lanes; ++i)
@@ -113,8 +136,8 @@ void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
   }
   // The upper of the middle two is the same, or the least sample above.
   const auto lower = hn::Load(d, median);
-  auto least = hn::Set(d, 255);
-  count_samples<1>(column.planes, below, [&](size_t t, auto& up_to, auto&) HWY_ATTR {
+  auto least = hn::Set(d, static_cast<T>(~T{0}));
+  count_samples<1, T>(column.planes, below, [&](size_t t, auto& up_to, auto&) HWY_ATTR {
     const auto x = column.at(t);
     const auto above = hn::Gt(x, lower);
     up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(above)));
@@ -125,7 +148,30 @@ void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
     if (masked[i] == all) continue;
     const int number = all - masked[i];
     const bool next = number % 2 == 0 && below[0][i] == masked[i] + number / 2;
-    level[i] = static_cast<uint8_t>((median[i] + (next ? upper[i] : median[i])) / 2);
+    level[i] = static_cast<T>((median[i] + (next ? upper[i] : median[i])) / 2);
+  }
+}
+
+// What lies beside samples, for as many of them: 255 or 0 as all bits or none.
+template <class D>
+HWY_INLINE hn::Vec<D> whole(D d, const uint8_t* from) {
+  if constexpr (sizeof(hn::TFromD<D>) == 1) {
+    return hn::LoadU(d, from);
+  } else {
+    const hn::RebindToSigned<D> wide;
+    const hn::Rebind<int8_t, D> narrow;
+    return hn::BitCast(
+        d, hn::PromoteTo(wide, hn::LoadU(narrow, reinterpret_cast<const int8_t*>(from))));
+  }
+}
+// Levels, of 2^low_bits samples each.
+template <class D>
+HWY_INLINE hn::Vec<D> in_samples(D d, const uint8_t* from, int low_bits) {
+  if constexpr (sizeof(hn::TFromD<D>) == 1) {
+    return hn::LoadU(d, from);
+  } else {
+    const hn::Rebind<uint8_t, D> narrow;
+    return hn::ShiftLeftSame(hn::PromoteTo(d, hn::LoadU(narrow, from)), low_bits);
   }
 }
 
@@ -133,25 +179,38 @@ void take_median(const Column& column, const uint16_t* HWY_RESTRICT masked,
 // of 64: what is not kept becomes the median of the others, or stays at `level` where there are
 // none; others come as near to it as reach, or stay where there is no reach. keep: rows
 // `keep_stride` apart. level: near the medians, which it becomes.
-void fill_rows(uint8_t* samples, size_t stride, size_t planes, const uint8_t* keep,
-               size_t keep_stride, const uint16_t* masked, const uint8_t* reach, size_t count,
-               uint8_t* level) {
-  const Bytes d;
+template <typename T>
+HWY_INLINE void fill(T* samples, size_t stride, size_t planes, const uint8_t* keep,
+                     size_t keep_stride, const uint16_t* masked, const uint8_t* reach, int low_bits,
+                     size_t count, T* level) {
+  const Samples<T> d;
   for (size_t first = 0; first < count; first += hn::Lanes(d)) {
-    take_median({samples + first, stride, planes}, masked + first, level + first);
+    take_median<T>({samples + first, stride, planes}, masked + first, 1 << low_bits, level + first);
     // While the samples are in the first cache.
     const auto l = hn::LoadU(d, level + first);
-    const auto most = reach ? hn::LoadU(d, reach + first) : hn::Set(d, 255);
+    const auto most =
+        reach ? in_samples(d, reach + first, low_bits) : hn::Set(d, static_cast<T>(~T{0}));
     for (size_t t = 0; t < planes; ++t) {
-      uint8_t* at = samples + t * stride + first;
+      T* at = samples + t * stride + first;
       const auto x = hn::LoadU(d, at);
-      const auto limit = hn::And(most, hn::LoadU(d, keep + t * keep_stride + first));
+      const auto limit = hn::And(most, whole(d, keep + t * keep_stride + first));
       const auto up = hn::Min(hn::SaturatedSub(x, l), limit);
       const auto down = hn::Min(hn::SaturatedSub(l, x), limit);
       // One of them is 0.
       hn::StoreU(hn::Sub(hn::Add(l, up), down), d, at);
     }
   }
+}
+
+void fill_rows(uint8_t* samples, size_t stride, size_t planes, const uint8_t* keep,
+               size_t keep_stride, const uint16_t* masked, const uint8_t* reach, size_t count,
+               uint8_t* level) {
+  fill(samples, stride, planes, keep, keep_stride, masked, reach, 0, count, level);
+}
+void fill_deep_rows(uint16_t* samples, size_t stride, size_t planes, const uint8_t* keep,
+                    size_t keep_stride, const uint16_t* masked, const uint8_t* reach, int low_bits,
+                    size_t count, uint16_t* level) {
+  fill(samples, stride, planes, keep, keep_stride, masked, reach, low_bits, count, level);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -164,7 +223,9 @@ namespace {
 
 HWY_EXPORT(expand_bits);
 HWY_EXPORT(take_row);
+HWY_EXPORT(take_deep_row);
 HWY_EXPORT(fill_rows);
+HWY_EXPORT(fill_deep_rows);
 
 constexpr size_t kUnit = 64;
 // Of samples and what is kept of them.
@@ -173,9 +234,10 @@ constexpr size_t kRunBytes = size_t{1} << 19;
 size_t round_up(size_t count) { return (count + kUnit - 1) / kUnit * kUnit; }
 
 // Pixels of a run.
-size_t run_of(int snapshots) {
+size_t run_of(int snapshots, bool deep) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
-  return std::clamp(kRunBytes / (m * (kChannels + 1)) / kUnit * kUnit, kUnit, size_t{4096});
+  const size_t of_pixel = m * (kChannels * (deep ? 2 : 1) + 1);
+  return std::clamp(kRunBytes / of_pixel / kUnit * kUnit, kUnit, size_t{4096});
 }
 
 }  // namespace
@@ -188,27 +250,36 @@ uint64_t WindowMask::bytes(int capacity, size_t pixels) {
   return uint64_t{mask_bytes(pixels)} * static_cast<uint64_t>(capacity) + kUnit;
 }
 
-uint64_t Filler::bytes(int snapshots) {
+uint64_t Filler::bytes(int snapshots, bool deep) {
   const auto m = static_cast<uint64_t>(std::max(snapshots, 1));
-  const uint64_t run = run_of(snapshots);
-  return (m + m * kChannels + 1 + sizeof(uint16_t)) * run + m * kChannels * sizeof(uint8_t*);
+  const uint64_t run = run_of(snapshots, deep), size = deep ? 2 : 1;
+  return (m + size * (m * kChannels + 1) + sizeof(uint16_t)) * run +
+         m * kChannels * sizeof(uint8_t*);
 }
 
-Filler::Filler(int snapshots) : run_(run_of(snapshots)) {
+Filler::Filler(int snapshots, bool deep) : run_(run_of(snapshots, deep)) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
   keep_.resize(m * run_);
-  // One row more for the level.
-  samples_.resize((m * kChannels + 1) * run_);
   masked_.resize(run_);
-  planes_.reserve(m * kChannels);
-  for (size_t k = 0; k < m * kChannels; ++k) planes_.push_back(samples_.data() + k * run_);
+  // One row more for the level.
+  if (deep)
+    list_rows(m * kChannels, &deep_samples_, &deep_planes_);
+  else
+    list_rows(m * kChannels, &samples_, &planes_);
 }
 
-const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                                   const WindowMask& mask, const Reference& reference,
-                                   const uint8_t* reach, size_t first, size_t count) {
+template <typename T>
+void Filler::list_rows(size_t planes, std::vector<T>* samples, std::vector<const T*>* rows) {
+  samples->resize((planes + 1) * run_);
+  rows->reserve(planes);
+  for (size_t k = 0; k < planes; ++k) rows->push_back(samples->data() + k * run_);
+}
+
+// Calls take(snapshot, the next one, keep, channel, factor, row) for each channel of each snapshot.
+template <typename Take>
+void Filler::take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                       const WindowMask& mask, size_t first, size_t padded, const Take& take) {
   const auto m = static_cast<size_t>(snapshots.size());
-  const size_t padded = round_up(count);
   std::fill_n(masked_.data(), padded, uint16_t{0});
   for (size_t t = 0; t < m; ++t) {
     uint8_t* keep = keep_.data() + t * run_;
@@ -216,13 +287,24 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
     HWY_DYNAMIC_DISPATCH(expand_bits)(mask.of(snapshot) + first / 8, padded, keep, masked_.data());
     for (size_t c = 0; c < kChannels; ++c) {
       const float gain = gains[t][c];
-      const int channel = static_cast<int>(c);
-      // Planes are padded like runs.
-      HWY_DYNAMIC_DISPATCH(take_row)
-      (snapshots.plane(snapshot, channel) + first, keep, padded, gain == 1 ? 1 : 1 / gain,
-       snapshots.plane(next, channel) + first, samples_.data() + (kChannels * t + c) * run_);
+      take(snapshot, next, keep, static_cast<int>(c), gain == 1 ? 1 : 1 / gain,
+           (kChannels * t + c) * run_);
     }
   }
+}
+
+const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                                   const WindowMask& mask, const ReferencePicture& reference,
+                                   const uint8_t* reach, size_t first, size_t count) {
+  const auto m = static_cast<size_t>(snapshots.size());
+  const size_t padded = round_up(count);
+  take_rows(snapshots, gains, mask, first, padded,
+            [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
+              // Planes are padded like runs.
+              HWY_DYNAMIC_DISPATCH(take_row)
+              (snapshots.plane(t, channel) + first, keep, padded, factor,
+               snapshots.plane(next, channel) + first, samples_.data() + row);
+            });
   uint8_t* level = samples_.data() + m * kChannels * run_;
   for (size_t c = 0; c < kChannels; ++c) {
     std::memcpy(level, reference.level[c].data() + first, count);
@@ -234,12 +316,45 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
   return planes_.data();
 }
 
-void fill_samples(const Reference& reference, const uint8_t* bits, const uint8_t* const x[3],
+const uint16_t* const* Filler::fill_deep(const SnapshotRange& snapshots,
+                                         const std::vector<Gain>& gains, const WindowMask& mask,
+                                         const ReferencePicture& reference, const uint8_t* reach,
+                                         size_t first, size_t count) {
+  const auto m = static_cast<size_t>(snapshots.size());
+  const size_t padded = round_up(count);
+  const int low_bits = snapshots.low_bits();
+  take_rows(snapshots, gains, mask, first, padded,
+            [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
+              HWY_DYNAMIC_DISPATCH(take_deep_row)
+              (snapshots.plane(t, channel) + first, snapshots.low_plane(t, channel) + first, keep,
+               low_bits, padded, factor, snapshots.plane(next, channel) + first,
+               snapshots.low_plane(next, channel) + first, deep_samples_.data() + row);
+            });
+  uint16_t* level = deep_samples_.data() + m * kChannels * run_;
+  for (size_t c = 0; c < kChannels; ++c) {
+    // The middle of what has this high digit.
+    for (size_t p = 0; p < count; ++p)
+      level[p] = static_cast<uint16_t>((2 * reference.level[c][first + p] + 1) << low_bits >> 1);
+    std::fill(level + count, level + padded, uint16_t{0});
+    HWY_DYNAMIC_DISPATCH(fill_deep_rows)
+    (deep_samples_.data() + c * run_, kChannels * run_, m, keep_.data(), run_, masked_.data(),
+     reach ? reach + first : nullptr, low_bits, padded, level);
+  }
+  return deep_planes_.data();
+}
+
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
+  fill_samples(reference, bits, x, gain, reach, {0, reference.height, step}, out);
+}
+
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
+                  const Gain& gain, const uint8_t* reach, const SampledRows& rows,
+                  uint8_t* const out[3]) {
   const bool lit = is_lit(gain);
   size_t sample = 0;
-  for (int row = 0; row < reference.height; row += step)
-    for (int col = 0; col < reference.width; col += step, ++sample) {
+  for (int row = rows.first; row < rows.end; row += rows.step)
+    for (int col = 0; col < reference.width; col += rows.step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
       const int limit = is_masked(bits, p) ? 0 : reach[p];

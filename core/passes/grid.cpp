@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/grid.cpp"
@@ -53,21 +54,26 @@ Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(hei
   cols = std::max(1, width / side);
 }
 
-void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
+namespace {
+
+// Of rows of cells first .. end - 1; the plane begins with row `plane_top` of the picture.
+void means_of_rows(const Grid& grid, int first_row, int end_row, const uint8_t* plane,
+                   int plane_top, float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
   constexpr int kColumns = 2048;
   alignas(64) uint32_t sums[kColumns];
   std::array<int, 2 * kMostCellsAlong + 1> left;
   for (int col = 0; col <= grid.cols; ++col) left[static_cast<size_t>(col)] = grid.left(col);
-  for (int row = 0; row < grid.rows; ++row) {
+  for (int row = first_row; row < end_row; ++row) {
     const int top = grid.top(row), height = grid.top(row + 1) - top;
     const int* next = left.data() + 1;  // where the cell ends
     uint64_t cell = 0;
     for (int first = 0; first < grid.width; first += kColumns) {
       const int count = std::min(kColumns, grid.width - first);
       HWY_DYNAMIC_DISPATCH(sum_columns)
-      (plane + static_cast<ptrdiff_t>(top) * grid.width + first, static_cast<size_t>(grid.width),
-       static_cast<size_t>(height), static_cast<size_t>(count), sums);
+      (plane + static_cast<ptrdiff_t>(top - plane_top) * grid.width + first,
+       static_cast<size_t>(grid.width), static_cast<size_t>(height), static_cast<size_t>(count),
+       sums);
       // A cell may end in these columns or go on in the next.
       for (int x = 0; x < count;) {
         const int end = std::min(count, *next - first);
@@ -79,6 +85,33 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
       }
     }
   }
+}
+
+// The row of cells that begins with row `top` of the picture.
+int row_at(const Grid& grid, int top) {
+  return static_cast<int>((int64_t{top} * grid.rows + grid.height - 1) / grid.height);
+}
+
+}  // namespace
+
+void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
+  means_of_rows(grid, 0, grid.rows, plane, 0, means);
+}
+
+void find_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
+                GridFrames* cells, int frame) {
+  const int first = row_at(grid, band.own_first()), end = row_at(grid, band.own_end());
+  for (int c = 0; c < kChannels; ++c)
+    means_of_rows(grid, first, end, planes[c], band.first(),
+                  cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
+  if (band.is_whole()) return;
+  std::vector<size_t> ends;
+  for (int rank = 0; rank < band.members(); ++rank)
+    ends.push_back(sizeof(float) * static_cast<size_t>(row_at(grid, band.end_of(rank))) *
+                   static_cast<size_t>(grid.cols));
+  for (int c = 0; c < kChannels; ++c)
+    band.team()->share(
+        Talk::cells, std::as_writable_bytes(std::span(cells->plane(frame, c), grid.cells())), ends);
 }
 
 }  // namespace qdmd

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/parallel/band.h"
 
 namespace qdmd {
 
@@ -54,5 +55,10 @@ class GridFrames {
 
 // The mean of each cell of a plane of grid.width * grid.height samples.
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
+
+// The same of all planes of a picture into picture `frame` of `cells`, where `planes` have the
+// band's rows only: members share what they find. Bands end where rows of cells do.
+void find_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
+                GridFrames* cells, int frame);
 
 }  // namespace qdmd

@@ -101,6 +101,7 @@ HWY_EXPORT(pack_bits);
 constexpr size_t kBitsRead = 64;
 
 constexpr int kMeanReach = 2, kMajorityReach = 3;  // pixels around one that judge it with it
+static_assert(kMeanReach + kMajorityReach == kMaskReach);
 
 // Repeats the first and the last of `width` samples that begin at padded[reach].
 void pad_ends(size_t width, size_t reach, uint8_t* padded) {
@@ -140,7 +141,7 @@ size_t mask_scratch_bytes(int width, int height) {
   return bytes + bytes % 2;
 }
 
-void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
                uint8_t* bits, uint8_t* scratch) noexcept {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
@@ -187,38 +188,51 @@ void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain
   HWY_DYNAMIC_DISPATCH(pack_bits)(mask, pixels, bits);
 }
 
-Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
-                 int step) {
+GainSums gain_sums(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+                   const SampledRows& rows) {
+  int64_t product[kChannels] = {}, square[kChannels] = {}, fit = 0, seen = 0;
+  for (int row = rows.first; row < rows.end; row += rows.step)
+    for (int col = 0; col < reference.width; col += rows.step, ++seen) {
+      const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
+                     static_cast<size_t>(col);
+      float squared = 0;
+      int brightest = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        const float away =
+            static_cast<float>(x[c][p]) - static_cast<float>(reference.level[c][p]) * gain[c];
+        squared += away * away;
+        brightest = std::max<int>(brightest, x[c][p]);
+      }
+      const float limit = reference.threshold[p];
+      if (squared >= limit * limit || brightest >= 250) continue;
+      ++fit;
+      for (size_t c = 0; c < 3; ++c) {
+        product[c] += x[c][p] * reference.level[c][p];
+        square[c] += reference.level[c][p] * reference.level[c][p];
+      }
+    }
+  return {product[0], product[1], product[2], square[0], square[1], square[2], fit, seen};
+}
+
+bool refine_gain(const GainSums& sums, Gain* gain) {
   // Where less fits, the gain would be of what moves.
   constexpr double kLeastShare = 0.1;
+  const auto fit = static_cast<double>(sums[2 * kChannels]),
+             seen = static_cast<double>(sums[2 * kChannels + 1]);
+  if (fit < kLeastShare * seen) return false;
+  for (size_t c = 0; c < kChannels; ++c)
+    if (sums[c] > 0)
+      (*gain)[c] = static_cast<float>(static_cast<double>(sums[c]) /
+                                      static_cast<double>(sums[kChannels + c]));
+  return true;
+}
+
+Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+                 int step) {
   Gain refined = gain;
-  for (int round = 0; round < 2; ++round) {
-    double product[3] = {0, 0, 0}, square[3] = {0, 0, 0};
-    size_t fit = 0, seen = 0;
-    for (int row = 0; row < reference.height; row += step)
-      for (int col = 0; col < reference.width; col += step, ++seen) {
-        const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
-                       static_cast<size_t>(col);
-        float squared = 0;
-        int brightest = 0;
-        for (size_t c = 0; c < 3; ++c) {
-          const float away =
-              static_cast<float>(x[c][p]) - static_cast<float>(reference.level[c][p]) * refined[c];
-          squared += away * away;
-          brightest = std::max<int>(brightest, x[c][p]);
-        }
-        const float limit = reference.threshold[p];
-        if (squared >= limit * limit || brightest >= 250) continue;
-        ++fit;
-        for (size_t c = 0; c < 3; ++c) {
-          product[c] += x[c][p] * reference.level[c][p];
-          square[c] += reference.level[c][p] * reference.level[c][p];
-        }
-      }
-    if (static_cast<double>(fit) < kLeastShare * static_cast<double>(seen)) break;
-    for (size_t c = 0; c < 3; ++c)
-      if (product[c] > 0) refined[c] = static_cast<float>(product[c] / square[c]);
-  }
+  for (int round = 0; round < kGainRounds; ++round)
+    if (!refine_gain(gain_sums(reference, x, refined, {0, reference.height, step}), &refined))
+      break;
   return refined;
 }
 

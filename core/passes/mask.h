@@ -1,16 +1,18 @@
 // Which pixels of a frame do not fit a background picture.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/passes/sampling.h"
 
 namespace qdmd {
 
 // A background picture and how far frames may lie from it; planes of width * height samples.
-struct Reference {
+struct ReferencePicture {
   int width = 0, height = 0;
   std::vector<uint8_t> level[kChannels];  // in unit light
   // Quaternion norm in levels: the mean residual of the 5 x 5 pixels around, above which a pixel is
@@ -27,17 +29,31 @@ inline bool is_masked(const uint8_t* bits, size_t pixel) {
   return (bits[pixel / 8] >> (pixel % 8) & 1) != 0;
 }
 
+// A pixel's mask depends on rows so far from it, of the reference and the frame.
+constexpr int kMaskReach = 5;
+
 // The mask of a frame: its residual, averaged over 5 x 5 pixels, exceeds the threshold in most of
 // the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes.
 // scratch: mask_scratch_bytes() at an even address, which can serve many calls; threads run this,
 // so it takes no memory.
-void find_mask(const Reference& reference, const uint8_t* const x[3], const Gain& gain,
+void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
                uint8_t* bits, uint8_t* scratch) noexcept;
 size_t mask_scratch_bytes(int width, int height);
 
 // The frame's gain over the reference by least squares on the sampled pixels that fit it under
 // `gain`; `gain` itself where too few do.
-Gain refine_gain(const Reference& reference, const uint8_t* const x[3], const Gain& gain, int step);
+Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+                 int step);
+
+// The same in steps, kGainRounds times: sums over sampled rows, which are whole numbers, so that
+// those of parts of a picture add up; and the gain that the sums of all say. False: too few pixels
+// fit, and there is no next round.
+constexpr int kGainRounds = 2;
+// Of each channel x times the reference, and the reference squared; pixels that fit; all.
+using GainSums = std::array<int64_t, 2 * kChannels + 2>;
+GainSums gain_sums(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+                   const SampledRows& rows);
+bool refine_gain(const GainSums& sums, Gain* gain);
 
 // out[p] = the mean of the 5 x 5 samples around p; the border's samples stand for those outside.
 void blur(const uint8_t* plane, int width, int height, uint8_t* out);

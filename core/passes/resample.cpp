@@ -30,7 +30,10 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::CappedTag<float, 16>;
+// Places are counted anew after so many samples, whatever vectors hold: sums of floats are rounded
+// where they begin, and pictures are the same with all of them.
+constexpr int kTogether = 16;
+using Floats = hn::CappedTag<float, kTogether>;
 using Vector = hn::Vec<Floats>;
 
 // c0 + t (c1 + t (c2 + t c3)).
@@ -61,7 +64,7 @@ HWY_INLINE Vector load_levels(const uint8_t* from) {
 }
 
 // to[i] is at place + i * step of a row whose samples begin at `row`: place is counted from there.
-// Whole vectors; neighbours in one are less than two samples further apart than they.
+// Whole vectors; of kTogether neighbours none is two samples further apart than they.
 void along_row(const uint8_t* row, float place, float step, int count, float* to) {
   const Floats d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
@@ -78,20 +81,23 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
     }
     return;
   }
-  const auto ahead = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
-  const float last = step * static_cast<float>(lanes - 1);
-  for (int i = 0; i < count; i += lanes) {
-    const float at = place + static_cast<float>(i) * step;
-    // Lanes are read from samples that are side by side: where places are further apart or nearer
+  const float last = step * static_cast<float>(kTogether - 1);
+  for (int first = 0; first < count; first += kTogether) {
+    const float at = place + static_cast<float>(first) * step;
+    // They are read from samples that are side by side: where places are further apart or nearer
     // than these, the way to them grows.
-    const float whole = std::floor(std::min(at, at + last - static_cast<float>(lanes - 1)));
+    const float whole = std::floor(std::min(at, at + last - static_cast<float>(kTogether - 1)));
     const uint8_t* const from = row + static_cast<int>(whole) - kBefore;
-    const auto way = hn::Sub(hn::Add(hn::Set(d, at - whole + kBefore), ahead), hn::Iota(d, 0));
-    auto sum = hn::Zero(d);
-    for (int k = 0; k <= kTaps; ++k)
-      sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
-                                 load_levels(from + k)));
-    hn::StoreU(sum, d, to + i);
+    const auto start = hn::Set(d, at - whole + kBefore), steps = hn::Set(d, step);
+    for (int i = 0; i < std::min(kTogether, count - first); i += lanes) {
+      const auto lane = hn::Iota(d, static_cast<float>(i));
+      const auto way = hn::Sub(hn::Add(start, hn::Mul(lane, steps)), lane);
+      auto sum = hn::Zero(d);
+      for (int k = 0; k <= kTaps; ++k)
+        sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
+                                   load_levels(from + i + k)));
+      hn::StoreU(sum, d, to + first + i);
+    }
   }
 }
 
@@ -110,8 +116,6 @@ void along_columns(const float* columns, size_t stride, float place, float step,
                    uint8_t* to) {
   const Floats d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
-  const auto way_of = hn::Mul(hn::Iota(d, 0), hn::Set(d, step));
-  const float last = step * static_cast<float>(lanes - 1);
   if (step == 0) {
     const float whole = std::floor(place);
     Vector weight[kTaps];
@@ -128,17 +132,23 @@ void along_columns(const float* columns, size_t stride, float place, float step,
     }
     return;
   }
-  for (int i = 0; i < count; i += lanes) {
-    const float at = place + static_cast<float>(i) * step;
+  const float last = step * static_cast<float>(kTogether - 1);
+  for (int first = 0; first < count; first += kTogether) {
+    const float at = place + static_cast<float>(first) * step;
     const float whole = std::floor(std::min(at, at + last));
-    const float* from =
-        columns + (static_cast<ptrdiff_t>(whole) - kBefore) * static_cast<ptrdiff_t>(stride) + i;
-    const auto way = hn::Add(hn::Set(d, at - whole + kBefore), way_of);
-    auto sum = hn::Zero(d);
-    for (int k = 0; k <= kTaps; ++k, from += stride)
-      sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
-                                 hn::LoadU(d, from)));
-    store_levels(sum, to + i);
+    const float* const top =
+        columns + (static_cast<ptrdiff_t>(whole) - kBefore) * static_cast<ptrdiff_t>(stride) +
+        first;
+    const auto start = hn::Set(d, at - whole + kBefore), steps = hn::Set(d, step);
+    for (int i = 0; i < std::min(kTogether, count - first); i += lanes) {
+      const auto way = hn::Add(start, hn::Mul(hn::Iota(d, static_cast<float>(i)), steps));
+      const float* from = top + i;
+      auto sum = hn::Zero(d);
+      for (int k = 0; k <= kTaps; ++k, from += stride)
+        sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
+                                   hn::LoadU(d, from)));
+      store_levels(sum, to + first + i);
+    }
   }
 }
 

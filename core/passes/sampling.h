@@ -6,6 +6,11 @@
 
 namespace qdmd {
 
+// Every step-th row from `first` to before `end`, in rows of a plane.
+struct SampledRows {
+  int first, end, step;
+};
+
 // How many there are along a side, and in a picture.
 constexpr size_t sample_count(int size, int step) {
   return static_cast<size_t>((size - 1) / step + 1);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/foreground/picture.h"
-#include "core/passes/planes.h"
+#include "core/frames/frame_store.h"
 #include "tests/bench/clock.h"
 
 namespace {
@@ -24,19 +24,27 @@ struct ChannelAt {
 struct Format {
   const char* name;
   std::array<ChannelAt, 4> at;  // pixel_stride 0: no such channel
+  SampleBits bits = {};
 };
-constexpr Format kFormats[] = {{"RGBA", {{{0, 0, 4}, {0, 1, 4}, {0, 2, 4}, {0, 3, 4}}}},
-                               {"RGB", {{{0, 0, 3}, {0, 1, 3}, {0, 2, 3}, {}}}},
-                               {"GBR", {{{2, 0, 1}, {0, 0, 1}, {1, 0, 1}, {}}}},
-                               {"I420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {}}}},
-                               {"A420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {3, 0, 1}}}},
-                               {"NV12", {{{0, 0, 1}, {1, 0, 2, 2, 2}, {1, 1, 2, 2, 2}, {}}}},
-                               {"Y42B", {{{0, 0, 1}, {1, 0, 1, 2, 1}, {2, 0, 1, 2, 1}, {}}}},
-                               {"NV16", {{{0, 0, 1}, {1, 0, 2, 2, 1}, {1, 1, 2, 2, 1}, {}}}},
-                               {"YUY2", {{{0, 0, 2}, {0, 1, 4, 2, 1}, {0, 3, 4, 2, 1}, {}}}},
-                               {"Y444", {{{0, 0, 1}, {1, 0, 1}, {2, 0, 1}, {}}}},
-                               {"AYUV", {{{0, 1, 4}, {0, 2, 4}, {0, 3, 4}, {0, 0, 4}}}},
-                               {"GRAY8", {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {}}}}};
+constexpr Format kFormats[] = {
+    {"RGBA", {{{0, 0, 4}, {0, 1, 4}, {0, 2, 4}, {0, 3, 4}}}},
+    {"RGB", {{{0, 0, 3}, {0, 1, 3}, {0, 2, 3}, {}}}},
+    {"GBR", {{{2, 0, 1}, {0, 0, 1}, {1, 0, 1}, {}}}},
+    {"I420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {}}}},
+    {"A420", {{{0, 0, 1}, {1, 0, 1, 2, 2}, {2, 0, 1, 2, 2}, {3, 0, 1}}}},
+    {"NV12", {{{0, 0, 1}, {1, 0, 2, 2, 2}, {1, 1, 2, 2, 2}, {}}}},
+    {"Y42B", {{{0, 0, 1}, {1, 0, 1, 2, 1}, {2, 0, 1, 2, 1}, {}}}},
+    {"NV16", {{{0, 0, 1}, {1, 0, 2, 2, 1}, {1, 1, 2, 2, 1}, {}}}},
+    {"YUY2", {{{0, 0, 2}, {0, 1, 4, 2, 1}, {0, 3, 4, 2, 1}, {}}}},
+    {"Y444", {{{0, 0, 1}, {1, 0, 1}, {2, 0, 1}, {}}}},
+    {"AYUV", {{{0, 1, 4}, {0, 2, 4}, {0, 3, 4}, {0, 0, 4}}}},
+    {"GRAY8", {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {}}}},
+    {"I420_10LE", {{{0, 0, 2}, {1, 0, 2, 2, 2}, {2, 0, 2, 2, 2}, {}}}, {10, 0}},
+    {"I422_10LE", {{{0, 0, 2}, {1, 0, 2, 2, 1}, {2, 0, 2, 2, 1}, {}}}, {10, 0}},
+    {"Y444_10LE", {{{0, 0, 2}, {1, 0, 2}, {2, 0, 2}, {}}}, {10, 0}},
+    {"P010_10LE", {{{0, 0, 2}, {1, 0, 4, 2, 2}, {1, 2, 4, 2, 2}, {}}}, {10, 6}},
+    {"GRAY16_LE", {{{0, 0, 2}, {0, 0, 2}, {0, 0, 2}, {}}}, {16, 0}},
+    {"RGBA64_LE", {{{0, 0, 8}, {0, 2, 8}, {0, 4, 8}, {0, 6, 8}}}, {16, 0}}};
 
 bool is_rgb(const Format& format) {
   const std::string name = format.name;
@@ -47,11 +55,13 @@ bool is_rgb(const Format& format) {
 struct Scene {
   int width, height;
   std::vector<uint8_t> planes[4], x[3], mask;
+  FrameStore store;
   MutableImageView view;
   BackgroundModel model;
   Levels levels;
 
-  Scene(const Format& format, int width_, int height_) : width(width_), height(height_) {
+  Scene(const Format& format, int width_, int height_)
+      : width(width_), height(height_), store(1, width_, height_, {1, 0, 1, 1, format.bits.low()}) {
     const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
     std::array<ptrdiff_t, 4> stride{};
     for (const ChannelAt& at : format.at)
@@ -59,12 +69,13 @@ struct Scene {
           std::max<ptrdiff_t>(stride[static_cast<size_t>(at.plane)],
                               (width + at.columns - 1) / at.columns * at.pixel_stride);
     view.width = width, view.height = height;
+    view.bits = format.bits;
     bool even = true;
     for (size_t c = 0; c < 4; ++c) {
       const ChannelAt& at = format.at[c];
       if (at.pixel_stride == 0) continue;
       const auto plane = static_cast<size_t>(at.plane);
-      planes[plane].resize(static_cast<size_t>(stride[plane] * height), 90);
+      planes[plane].resize(static_cast<size_t>(stride[plane] * height) + 8, 90);
       (c < 3 ? view.channel[c] : view.alpha) = planes[plane].data() + at.offset;
       view.own[c] = {at.pixel_stride, stride[plane], at.columns, at.rows};
       even = even && view.own[c] == view.own[0];
@@ -76,6 +87,8 @@ struct Scene {
     if (!is_rgb(format)) levels = {{16, 128, 128}, {235, 128, 128}};
     for (auto& plane : x) plane.resize(pixels, 100);
     for (size_t p = 0; p < pixels; ++p) mask.push_back(p % 300 < 30 ? 255 : 0);
+    split();
+    model.set_low_bits(format.bits.low());
     model.make_room(pixels, false);
     model.freeze_as(x, nullptr, pixels);
     model.set_time(0);
@@ -84,16 +97,18 @@ struct Scene {
   void split() {
     ImageView in;
     in.width = width, in.height = height;
+    in.bits = view.bits;
     in.pixel_stride = view.pixel_stride, in.row_stride = view.row_stride;
     for (int c = 0; c < 3; ++c) in.channel[c] = view.channel[c];
     in.alpha = view.alpha;
     for (int c = 0; c < 4; ++c) in.own[c] = view.own[c];
-    uint8_t* const to[3] = {x[0].data(), x[1].data(), x[2].data()};
-    benchmark::DoNotOptimize(split_channels(in, 0, height, 90, to));
+    benchmark::DoNotOptimize(store.append(in));
   }
   void write(Output output) {
     OutputTask task = {};
+    const int slot = store.slot(0);
     for (int c = 0; c < 3; ++c) task.x[c] = x[c].data();
+    for (int c = 0; view.bits.is_deep() && c < 3; ++c) task.low[c] = store.low(slot, c);
     task.model = &model, task.output = output, task.mask = mask.data(), task.constant_alpha = 255;
     write_picture(task, levels, view, 0, height);
   }

@@ -39,7 +39,7 @@ struct Solve {
   std::vector<Gain> gains;
   std::vector<LitPicture> pictures;
   StableFrames stable;
-  Reference reference;
+  ReferencePicture reference;
   std::vector<uint8_t> spread, reach, scratch;
   WindowMask mask;
   Filler filler;

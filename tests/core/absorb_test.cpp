@@ -47,7 +47,7 @@ std::vector<double> white_of(const Clip& clip, const EngineOptions& options, int
   engine.set_absorb_frames(frames);
   const auto take = [&] {
     while (engine.ready()) {
-      Picture picture(kWidth, kHeight);
+      PackedPicture picture(kWidth, kHeight);
       engine.pop(Output::mask, picture.out());
       const auto left = 2 * static_cast<int>(white.size() % 80) - 20;
       int hits = 0, pixels = 0;
@@ -61,7 +61,7 @@ std::vector<double> white_of(const Clip& clip, const EngineOptions& options, int
     }
   };
   for (const auto& frame : clip.frames) {
-    Picture picture(kWidth, kHeight);
+    PackedPicture picture(kWidth, kHeight);
     picture.fill(frame);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     take();

@@ -47,8 +47,8 @@ enum class Alpha { none, constant, varying };
 struct Steady {
   static constexpr int kWidth = 240, kHeight = 160;
   Engine engine;
-  std::vector<Picture> frames;
-  Picture out;
+  std::vector<PackedPicture> frames;
+  PackedPicture out;
 
   Steady(const EngineOptions& options, Alpha alpha, std::mt19937& rng)
       : out(kWidth, kHeight, alpha == Alpha::none ? 3 : 4, alpha != Alpha::none) {

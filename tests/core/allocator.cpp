@@ -14,7 +14,13 @@
 #include <cstring>
 #include <new>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__has_feature)
+#define QDMD_FEATURE(name) __has_feature(name)
+#else
+#define QDMD_FEATURE(name) 0
+#endif
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
+    !QDMD_FEATURE(address_sanitizer) && !QDMD_FEATURE(thread_sanitizer)
 #define QDMD_REPLACES_MALLOC 1
 #else
 #define QDMD_REPLACES_MALLOC 0

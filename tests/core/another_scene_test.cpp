@@ -53,13 +53,13 @@ Seen run(const Clip& clip, const EngineOptions& options) {
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   const auto take = [&] {
     while (engine.ready()) {
-      Picture picture(kWidth, kHeight);
+      PackedPicture picture(kWidth, kHeight);
       engine.pop(Output::background, picture.out());
       seen.backgrounds.push_back(picture.planes());
     }
   };
   for (size_t t = 0; t < clip.size(); ++t) {
-    Picture picture(kWidth, kHeight);
+    PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     while (seen.scenes.size() < engine.scenes()) seen.scenes.push_back(static_cast<int>(t));

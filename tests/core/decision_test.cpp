@@ -25,9 +25,9 @@ struct Planes {
 };
 
 // What a model makes of one picture, for ever.
-BackgroundModel model_of(const Planes& background) {
+BackgroundModel model_of(const Planes& background, uint8_t limit = 12) {
   BackgroundModel model;
-  const std::vector<uint8_t> limits(background.pixels(), 12);
+  const std::vector<uint8_t> limits(background.pixels(), limit);
   model.make_room(background.pixels(), true);
   model.freeze_as(background.level, &limits, background.pixels());
   model.set_time(0);
@@ -35,13 +35,14 @@ BackgroundModel model_of(const Planes& background) {
 }
 
 struct Decided {
-  Decided(const Planes& background, const DecisionSteps& steps = {}, Colours colours = Colours::rgb)
-      : model(model_of(background)),
-        decision(background.width, background.height, colours, steps) {}
+  Decided(const Planes& background, const DecisionSteps& steps = {}, Colours colours = Colours::rgb,
+          const Levels& levels = {}, uint8_t limit = 12)
+      : model(model_of(background, limit)),
+        decision(background.width, background.height, colours, steps, levels) {}
   const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
     decision.decide({{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
                      &model,
-                     18,
+                     threshold,
                      limits ? model.limits() : nullptr},
                     pool);
     return decision.mask();
@@ -49,6 +50,7 @@ struct Decided {
   BackgroundModel model;
   Decision decision;
   bool limits = true;  // of pixels
+  double threshold = 18;
 };
 
 // A floor with a texture, in colours.
@@ -66,6 +68,41 @@ Planes floor_of(int width, int height, std::mt19937& rng) {
 
 size_t white(const uint8_t* mask, size_t count) {
   return static_cast<size_t>(std::count(mask, mask + count, uint8_t{255}));
+}
+
+constexpr Levels kLimited = {{16, 128, 128}, {235, 128, 128}},
+                 kFull = {{0, 128, 128}, {255, 128, 128}};
+
+// Less light: chroma goes with luma's distance from black, wherever black is.
+TEST(Light, GoesDownToTheBlackOfItsRange) {
+  std::mt19937 rng(340);
+  for (const Levels& levels : {kFull, kLimited}) {
+    const int black = levels.black[0];
+    Planes floor(320, 240);
+    for (int y = 0; y < 240; ++y)
+      for (int x = 0; x < 320; ++x) {
+        const int grain = static_cast<int>(rng() % 21) - 10;
+        floor.at(0, x, y) = static_cast<uint8_t>(black + 70 + grain);
+        floor.at(1, x, y) = static_cast<uint8_t>(128 - 90);
+        floor.at(2, x, y) = static_cast<uint8_t>(128 + 100);
+      }
+    Planes frame = floor;
+    for (int y = 0; y < 240; ++y)
+      for (int x = 0; x < 160; ++x)
+        for (int c = 0; c < 3; ++c) {
+          const int dark = levels.black[c], level = frame.at(c, x, y);
+          frame.at(c, x, y) = static_cast<uint8_t>(std::lround(dark + 0.6 * (level - dark)));
+        }
+    const auto white_of = [&](const Levels& assumed) {
+      // Little noise, so that little rest is left to light.
+      Decided decided(floor, {}, Colours::yuv, assumed, 4);
+      decided.threshold = 8;
+      return white(decided(frame), floor.pixels());
+    };
+    EXPECT_LT(white_of(levels), 0.01 * 160 * 240) << black;
+    // Such a change is no light where black is elsewhere.
+    EXPECT_GT(white_of(black == 0 ? kLimited : kFull), 0.5 * 160 * 240) << black;
+  }
 }
 
 TEST(Light, IsNoForeground) {
@@ -98,7 +135,7 @@ TEST(Light, IsNoForeground) {
           if (somebody(x, y)) level = c == 2 ? 170 : 60;
         }
     for (Shadows shadows : {Shadows::background, Shadows::foreground, Shadows::marked}) {
-      Decided decided(samples(floor), {}, colours);
+      Decided decided(samples(floor), {}, colours, colours == Colours::yuv ? kLimited : Levels{});
       decided.decision.set_shadows(shadows);
       const uint8_t* mask = decided(samples(frame));
       size_t inside = 0, dark = 0, marked = 0;
@@ -349,7 +386,7 @@ std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode,
   Engine engine;
   engine.set_masks_expected(masks_expected);
   EXPECT_TRUE(engine.configure(options, frames[0].width, frames[0].height).ok());
-  Picture picture(frames[0].width, frames[0].height, 3, false, 0);
+  PackedPicture picture(frames[0].width, frames[0].height, 3, false, 0);
   std::vector<double> shares;
   const auto pop = [&] {
     while (engine.ready()) {

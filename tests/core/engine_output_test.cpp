@@ -77,7 +77,7 @@ TEST(EngineOutput, PicturesOfOneFrameShareWhatIsComputed) {
           for (size_t k = 0; k < 6; ++k) {
             const size_t which = (k + frame) % 4;
             // Packed, in rows with gaps or without, and each channel by itself.
-            Picture packed(strip.width, 1, 3 + static_cast<int>(k % 2));
+            PackedPicture packed(strip.width, 1, 3 + static_cast<int>(k % 2));
             strip.engine.write(kOutputs[which], Levels(), packed.out());
             ASSERT_EQ((*expected[which])[frame], packed.planes()) << which << " of " << frame;
             std::vector<uint8_t> planes(3 * clip.pixels);
@@ -147,7 +147,7 @@ TEST(EngineLayout, PaddingIsNeitherReadNorWritten) {
     options.foreground_threshold = 0.5;
     ASSERT_TRUE(engine.configure(options, width, height).ok());
     // RGBx without an alpha view, RGB, and RGBA, every one with another row padding.
-    Picture rgbx(width, height, 4, false, 12), rgb(width, height, 3, false, 3),
+    PackedPicture rgbx(width, height, 4, false, 12), rgb(width, height, 3, false, 3),
         rgba(width, height, 4, true, 5);
     for (auto* picture : {&rgbx, &rgb, &rgba}) {
       picture->fill(still);
@@ -156,7 +156,7 @@ TEST(EngineLayout, PaddingIsNeitherReadNorWritten) {
     ASSERT_TRUE(engine.drain().ok());
     for (auto [bytes_per_pixel, with_alpha, padding] :
          {std::tuple(4, false, 12), std::tuple(3, false, 3), std::tuple(4, true, 5)}) {
-      Picture out(width, height, bytes_per_pixel, with_alpha, padding);
+      PackedPicture out(width, height, bytes_per_pixel, with_alpha, padding);
       engine.pop(output, out.out());
       EXPECT_EQ(out.planes(), output == Output::background ? still : std::vector<uint8_t>(105, 0));
       for (int row = 0; row < height; ++row)
@@ -207,7 +207,7 @@ TEST(EngineAlpha, PassesThroughWithItsOwnFrame) {
     int popped = 0;
     const auto take = [&] {
       while (engine.ready()) {
-        Picture out(width, height, 4, true, 2);
+        PackedPicture out(width, height, 4, true, 2);
         engine.pop(output, out.out());
         for (size_t p = 0; p < out.pixels(); ++p)
           ASSERT_EQ(out.at(3, p), alpha_of(popped, p, popped % 2 == 1)) << popped;
@@ -216,7 +216,7 @@ TEST(EngineAlpha, PassesThroughWithItsOwnFrame) {
     };
     // Five frames over windows of three: slots change between constant and varying.
     for (int t = 0; t < count; ++t) {
-      Picture in(width, height, 4, true);
+      PackedPicture in(width, height, 4, true);
       in.fill(random_picture(24, rng));
       for (size_t p = 0; p < in.pixels(); ++p) in.at(3, p) = alpha_of(t, p, t % 2 == 1);
       ASSERT_TRUE(engine.push(in.in()).ok());
@@ -233,14 +233,14 @@ TEST(EngineAlpha, PaddingIsOpaque) {
   for (auto output : {Output::background, Output::foreground, Output::mask, Output::cutout}) {
     Engine engine;
     ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
-    Picture padded(3, 3, 4, true), plain(3, 3, 3);
+    PackedPicture padded(3, 3, 4, true), plain(3, 3, 3);
     padded.fill(random_picture(9, rng));
     plain.fill(random_picture(9, rng));
     auto in = padded.in();
     in.alpha_is_padding = true;
     engine.push(in);
     engine.push(plain.in());
-    Picture out(3, 3, 4, true);
+    PackedPicture out(3, 3, 4, true);
     auto view = out.out();
     view.alpha_is_padding = true;
     ASSERT_TRUE(engine.ready());
@@ -249,7 +249,7 @@ TEST(EngineAlpha, PaddingIsOpaque) {
     if (output == Output::cutout) continue;
     // A frame without alpha is opaque in an output that has it.
     ASSERT_TRUE(engine.drain().ok());
-    out = Picture(3, 3, 4, true);
+    out = PackedPicture(3, 3, 4, true);
     engine.pop(output, out.out());
     for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
   }
@@ -259,7 +259,7 @@ TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
   std::mt19937 rng(128);
   Engine engine;
   ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
-  Picture with_alpha(3, 3, 4, true), plain(3, 3, 3);
+  PackedPicture with_alpha(3, 3, 4, true), plain(3, 3, 3);
   with_alpha.fill(random_picture(9, rng));
   plain.fill(random_picture(9, rng));
   for (size_t p = 0; p < 9; ++p) with_alpha.at(3, p) = alpha_of(0, p, true);
@@ -267,7 +267,7 @@ TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
   int popped = 0;
   const auto take = [&] {
     while (engine.ready()) {
-      Picture out(3, 3, 4, true);
+      PackedPicture out(3, 3, 4, true);
       engine.pop(Output::background, out.out());
       for (size_t p = 0; p < 9; ++p)
         EXPECT_EQ(out.at(3, p), popped >= 2 ? 255 : alpha_of(0, p, true)) << popped;
@@ -288,12 +288,12 @@ TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
 TEST(EngineAlpha, InputPaddingIsNotTakenForAlpha) {
   Engine engine;
   ASSERT_TRUE(engine.configure(window_of(2), 3, 3).ok());
-  Picture padded(3, 3, 4, true);  // 0xA5 in all bytes
+  PackedPicture padded(3, 3, 4, true);  // 0xA5 in all bytes
   auto in = padded.in();
   in.alpha_is_padding = true;
   engine.push(in);
   engine.push(in);
-  Picture out(3, 3, 4, true);
+  PackedPicture out(3, 3, 4, true);
   engine.pop(Output::background, out.out());
   for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
 }
@@ -310,7 +310,7 @@ TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
     Engine engine;
     ASSERT_TRUE(engine.configure(options, static_cast<int>(pixels), 1).ok());
     for (size_t t = 0; t < count; ++t) {
-      Picture in(static_cast<int>(pixels), 1, 4, true);
+      PackedPicture in(static_cast<int>(pixels), 1, 4, true);
       in.fill(clip.frames[t]);
       for (size_t p = 0; p < pixels; ++p)
         in.at(3, p) = static_cast<uint8_t>(varies ? 20 + p : 77 + t);
@@ -319,7 +319,7 @@ TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
     ASSERT_TRUE(engine.drain().ok());
     for (size_t t = 0; t < count; ++t) {
       ASSERT_TRUE(engine.ready());
-      Picture out(static_cast<int>(pixels), 1, 4, true);
+      PackedPicture out(static_cast<int>(pixels), 1, 4, true);
       engine.pop(Output::cutout, out.out());
       EXPECT_EQ(out.planes(), reference.cutout[t]);
       for (size_t p = 0; p < pixels; ++p) {
@@ -355,7 +355,7 @@ TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
           ASSERT_EQ(mask[p], out.mask[t][p]);
           ASSERT_EQ(residual[p], static_cast<int>(std::min(255.0, std::sqrt(squared))));
         }
-        Picture picture(static_cast<int>(clip.pixels), 1);
+        PackedPicture picture(static_cast<int>(clip.pixels), 1);
         strip.engine.pop(Output::mask, picture.out());
       }
     }
@@ -369,12 +369,12 @@ TEST(EngineOutput, WriteBackgroundIsThatOfTheNewestFrame) {
     options.mode = mode;
     const int width = static_cast<int>(clip.pixels);
     Engine engine;
-    Picture newest(width, 1), last(width, 1);
+    PackedPicture newest(width, 1), last(width, 1);
     EXPECT_FALSE(engine.write_background(newest.out()));
     ASSERT_TRUE(engine.configure(options, width, 1).ok());
     EXPECT_FALSE(engine.write_background(newest.out()));
     for (const auto& frame : clip.frames) {
-      Picture picture(width, 1);
+      PackedPicture picture(width, 1);
       picture.fill(frame);
       ASSERT_TRUE(engine.push(picture.in()).ok());
       // Batch: the window is full now, and its last frame is the newest.
@@ -388,7 +388,7 @@ TEST(EngineOutput, WriteBackgroundIsThatOfTheNewestFrame) {
       EXPECT_NE(newest.planes(), last.planes());
       ASSERT_TRUE(engine.drain().ok());
       while (engine.ready()) {
-        Picture again(width, 1);
+        PackedPicture again(width, 1);
         EXPECT_TRUE(engine.write_background(again.out()));
         EXPECT_EQ(newest.planes(), again.planes());
         engine.pop(Output::background, last.out());

@@ -1,5 +1,7 @@
 // The engine from the outside: frames in, pictures out.
+#include <array>
 #include <functional>
+#include <limits>
 
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"
@@ -157,13 +159,13 @@ TEST(Engine, ConfigureStartsAfresh) {
 
 TEST(EngineStatus, BeforeConfigure) {
   Engine engine;
-  Picture picture(2, 2);
+  PackedPicture picture(2, 2);
   EXPECT_EQ(engine.push(picture.in()).code, Status::Code::not_configured);
   EXPECT_EQ(engine.drain().code, Status::Code::not_configured);
   EXPECT_FALSE(engine.ready());
   engine.flush();
   engine.pop(Output::background, picture.out());
-  EXPECT_EQ(picture.bytes, Picture(2, 2).bytes) << "nothing to pop, nothing written";
+  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing to pop, nothing written";
 }
 
 TEST(EngineStatus, PushWhileFramesAreWaiting) {
@@ -197,7 +199,7 @@ Status::Code configured(const std::function<void(EngineOptions&)>& change, int w
 
 TEST(EngineStatus, FramesOfAnotherSize) {
   Strip strip(8, window_of(3));
-  Picture wider(9, 1), higher(8, 2);
+  PackedPicture wider(9, 1), higher(8, 2);
   EXPECT_EQ(strip.engine.push(wider.in()).code, Status::Code::invalid_options);
   EXPECT_EQ(strip.engine.push(higher.in()).code, Status::Code::invalid_options);
   EXPECT_EQ(strip.engine.pending(), 0);
@@ -262,9 +264,40 @@ TEST(EngineStatus, AdjointSolverHasAMemoryNeedOfItsOwn) {
 }
 
 TEST(EngineStatus, MemoryNeedDoesNotWrapAround) {
+  constexpr int kLongest = std::numeric_limits<int>::max();
   // 3 * 16 * 2^60 bytes are 0 modulo 2^64.
-  Engine engine;
-  EXPECT_EQ(engine.configure(window_of(16), 1 << 30, 1 << 30).code, Status::Code::too_much_memory);
+  for (const auto& [m, width, height] : {std::array{16, 1 << 30, 1 << 30},
+                                         {2048, 8192, 8192},
+                                         {2, kLongest, kLongest},
+                                         {2048, kLongest, kLongest},
+                                         {2048, kLongest, 32},
+                                         {2, 1 << 18, 1 << 18},
+                                         {2048, 32, kLongest}})
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (Method method : {Method::qdmd, Method::robust, Method::dmd})
+        for (Stabilize stabilize : {Stabilize::off, Stabilize::similarity})
+          for (uint64_t most : {uint64_t{4} << 30, UINT64_MAX}) {
+            auto options = window_of(m);
+            options.mode = mode;
+            options.method = method;
+            options.stabilize = stabilize;
+            options.mask_softness = 3;
+            options.max_memory = most;
+            const Status status = check_options(options, width, height);
+            const bool too_many = uint64_t(width) * uint64_t(height) >= uint64_t{1} << 36;
+            EXPECT_EQ(status.ok(), most == UINT64_MAX && !too_many)
+                << m << " " << width << "x" << height << ": " << status.message;
+            if (status.ok()) continue;
+            EXPECT_EQ(status.code, Status::Code::too_much_memory) << status.message;
+            for (const char* word : {"window-size", "max-memory"})
+              EXPECT_NE(status.message.find(word), std::string::npos) << status.message;
+            // What would be allocated is known to the byte.
+            if (!too_many) {
+              EXPECT_GT(layout_of(options, width, height).bytes, 3ull * static_cast<uint64_t>(m) *
+                                                                     static_cast<uint64_t>(width) *
+                                                                     static_cast<uint64_t>(height));
+            }
+          }
 }
 
 // ---- Windows that are their own background ----

@@ -9,14 +9,14 @@ namespace qdmd::test {
 inline constexpr uint8_t kUntouched = 0xA5;
 
 // A packed picture of its own. bytes_per_pixel 4 has alpha at offset 3 when `with_alpha`.
-struct Picture {
+struct PackedPicture {
   int width, height, bytes_per_pixel;
   bool with_alpha;
   ptrdiff_t row_stride;
   std::vector<uint8_t> bytes;
 
-  Picture(int width_, int height_, int bytes_per_pixel_ = 4, bool with_alpha_ = false,
-          int padding = 0)
+  PackedPicture(int width_, int height_, int bytes_per_pixel_ = 4, bool with_alpha_ = false,
+                int padding = 0)
       : width(width_),
         height(height_),
         bytes_per_pixel(bytes_per_pixel_),
@@ -67,12 +67,12 @@ struct Strip {
     EXPECT_TRUE(status.ok()) << status.message;
   }
   Status push(const std::vector<uint8_t>& planes) {
-    Picture picture(width, 1);
+    PackedPicture picture(width, 1);
     picture.fill(planes);
     return engine.push(picture.in());
   }
   std::vector<uint8_t> pop(Output output) {
-    Picture picture(width, 1);
+    PackedPicture picture(width, 1);
     engine.pop(output, picture.out());
     return picture.planes();
   }

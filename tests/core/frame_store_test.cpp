@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kWidth = 37, kHeight = 23;
 
-Picture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1) {
-  Picture picture(kWidth, kHeight, with_alpha ? 4 : 3, with_alpha, 5);
+PackedPicture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1) {
+  PackedPicture picture(kWidth, kHeight, with_alpha ? 4 : 3, with_alpha, 5);
   for (uint8_t& byte : picture.bytes) byte = static_cast<uint8_t>(rng() >> 7);
   if (constant_alpha >= 0)
     for (size_t p = 0; p < picture.pixels(); ++p)
@@ -21,7 +21,7 @@ Picture random_frame(std::mt19937& rng, bool with_alpha, int constant_alpha = -1
 }
 
 // Everything that the store says of a frame, by its definition.
-void expect_frame(const FrameStore& store, int index, Picture& picture, int step) {
+void expect_frame(const FrameStore& store, int index, PackedPicture& picture, int step) {
   const int slot = store.slot(index);
   const auto at = [&](size_t c, int x, int y) {
     return picture.at(c, static_cast<size_t>(y) * kWidth + static_cast<size_t>(x));
@@ -55,7 +55,7 @@ TEST(FrameStore, HasAllThatBelongsToTheNewestFrames) {
   for (int step : {1, 3, 64})
     for (int along : {0, 1, 7, 23}) {
       FrameStore store(4, kWidth, kHeight, {step, along});
-      std::deque<Picture> held;
+      std::deque<PackedPicture> held;
       for (int t = 0; t < 11; ++t) {
         held.push_back(random_frame(rng, false));
         if (held.size() > 4) held.pop_front();
@@ -77,12 +77,12 @@ TEST(FrameStore, KeepsAlphaOnceItVaries) {
   const uint64_t without = store.bytes();
   EXPECT_EQ(without, FrameStore::bytes(3, kWidth, kHeight, {}));
   EXPECT_EQ(store.bytes_with_alpha(), without + 3 * kWidth * kHeight);
-  Picture constant = random_frame(rng, true, 77);
+  PackedPicture constant = random_frame(rng, true, 77);
   ASSERT_TRUE(store.append(constant.in()));
   EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
   EXPECT_EQ(store.constant_alpha(store.slot(0)), 77);
   EXPECT_EQ(store.bytes(), without);
-  Picture varying = random_frame(rng, true);
+  PackedPicture varying = random_frame(rng, true);
   ASSERT_TRUE(store.append(varying.in()));
   EXPECT_EQ(store.bytes(), store.bytes_with_alpha());
   EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
@@ -97,12 +97,103 @@ TEST(FrameStore, KeepsAlphaOnceItVaries) {
 TEST(FrameStore, RefusesAlphaForWhichThereIsNoRoom) {
   std::mt19937 rng(403);
   const uint64_t needed = FrameStore::bytes(3, kWidth, kHeight, {}) + 3 * kWidth * kHeight;
-  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  PackedPicture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
   for (uint64_t most : {needed - 1, needed}) {
     FrameStore store(3, kWidth, kHeight, {}, most);
     EXPECT_TRUE(store.append(constant.in()));
     EXPECT_EQ(store.append(varying.in()), most == needed);
   }
+}
+
+// Words of 12 bits in a packed frame with alpha, the low ones in random bits.
+struct DeepFrame {
+  static constexpr SampleBits kBits = {12, 2};
+  std::vector<uint8_t> bytes;
+
+  DeepFrame(std::mt19937& rng, bool alpha_varies) : bytes(size_t{8} * kWidth * kHeight) {
+    for (uint8_t& byte : bytes) byte = static_cast<uint8_t>(rng() >> 7);
+    for (size_t p = 0; !alpha_varies && p < bytes.size() / 8; ++p)
+      bytes[8 * p + 6] = 0x54, bytes[8 * p + 7] = 0x12;
+  }
+  ImageView view() const {
+    ImageView view;
+    for (int c = 0; c < 3; ++c) view.channel[c] = bytes.data() + 2 * c;
+    view.alpha = bytes.data() + 6;
+    view.bits = kBits;
+    view.width = kWidth, view.height = kHeight;
+    view.pixel_stride = 8, view.row_stride = 8 * kWidth;
+    return view;
+  }
+  int sample(int c, size_t p) const {
+    const size_t at = 8 * p + 2 * static_cast<size_t>(c);
+    return (bytes[at] | bytes[at + 1] << 8) >> kBits.shift & kBits.most();
+  }
+};
+
+TEST(DeepFrameStore, HasBothDigitsOfEverything) {
+  std::mt19937 rng(405);
+  for (int step : {1, 3}) {
+    const FrameContents contents = {step, 0, 1, 1, DeepFrame::kBits.low()};
+    FrameStore store(3, kWidth, kHeight, contents);
+    EXPECT_EQ(store.bytes(), FrameStore::bytes(3, kWidth, kHeight, contents));
+    std::deque<DeepFrame> held;
+    for (int t = 0; t < 8; ++t) {
+      const bool varies = t % 3 == 1;
+      held.emplace_back(rng, varies);
+      if (held.size() > 3) held.pop_front();
+      ASSERT_TRUE(store.append(held.back().view()));
+      const SnapshotRange whole = store.whole(store.window()),
+                          samples = store.whole_samples(store.window());
+      for (int i = 0; i < store.size(); ++i) {
+        const DeepFrame& frame = held[static_cast<size_t>(i)];
+        size_t sample = 0;
+        for (int y = 0; y < kHeight; ++y)
+          for (int x = 0; x < kWidth; ++x) {
+            const auto p = static_cast<size_t>(y * kWidth + x);
+            for (int c = 0; c < kChannels; ++c) {
+              ASSERT_EQ(whole.sample(i, c, p), frame.sample(c, p));
+              if (x % step == 0 && y % step == 0) {
+                ASSERT_EQ(samples.sample(i, c, sample), frame.sample(c, p));
+              }
+            }
+            if (x % step == 0 && y % step == 0) ++sample;
+          }
+      }
+      const int slot = store.window().newest_slot();
+      ASSERT_EQ(store.alpha(slot) != nullptr, varies);
+      for (size_t p = 0; varies && p < size_t{kWidth} * kHeight; ++p)
+        ASSERT_EQ(store.alpha(slot)[p] << 4 | store.alpha_low(slot)[p], held.back().sample(3, p));
+      if (!varies) {
+        EXPECT_EQ(store.constant_alpha(slot) << 4 | store.constant_alpha_low(slot), 0x1254 >> 2);
+      }
+    }
+  }
+}
+
+// What is moved has 8 bits, and what came keeps all; at rest again it is as it came.
+TEST(DeepFrameStore, KeepsWhatCameOfFramesThatAreMoved) {
+  std::mt19937 rng(406);
+  const FrameContents contents = {1, 0, 1, 1, DeepFrame::kBits.low()};
+  FrameStore store(2, kWidth, kHeight, contents);
+  const DeepFrame frame(rng, false);
+  ASSERT_TRUE(store.append(frame.view()));
+  Pool pool(1);
+  Resampler resampler;
+  Pose pose;
+  pose.x = 3;
+  ASSERT_TRUE(store.steady(0, pose, &resampler, &pool));
+  const int slot = store.slot(0);
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p) {
+      ASSERT_EQ(store.untouched(slot, c)[p] << 4 | store.untouched_low(slot, c)[p],
+                frame.sample(c, p));
+      ASSERT_EQ(store.low(slot, c)[p], 8);
+    }
+  ASSERT_TRUE(store.steady(0, Pose(), &resampler, &pool));
+  const SnapshotRange whole = store.whole(store.window());
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p)
+      ASSERT_EQ(whole.sample(0, c, p), frame.sample(c, p));
 }
 
 // The engine counts it, too, and says what to change.
@@ -112,7 +203,7 @@ TEST(EngineMemory, OfAlphaThatVaries) {
   options.window_size = 5;
   const uint64_t without = layout_of(options, kWidth, kHeight).bytes,
                  with = without + 5 * kWidth * kHeight;
-  Picture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
+  PackedPicture constant = random_frame(rng, true, 255), varying = random_frame(rng, true);
   for (uint64_t most : {without, with - 1, with}) {
     options.max_memory = most;
     Engine engine;

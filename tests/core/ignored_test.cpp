@@ -199,7 +199,7 @@ TEST(Ignored, SaysNothingInStatistics) {
       Engine engine;
       ASSERT_TRUE(engine.configure(options, 160, 60).ok());
       if (ignored) engine.set_ignored(areas_of({screen.area}));
-      Picture picture(160, 60, 3);
+      PackedPicture picture(160, 60, 3);
       for (const Floor& frame : screen.frames) {
         picture.fill(frame.planes());
         ASSERT_TRUE(engine.push(picture.in()).ok());
@@ -225,7 +225,7 @@ TEST(Ignored, MayBeAllOfWhatStatisticsLookAt) {
   Engine engine;
   ASSERT_TRUE(engine.configure(options, 160, 60).ok());
   engine.set_ignored(areas_of({{0, 0, 160, 60}}));
-  Picture picture(160, 60, 3);
+  PackedPicture picture(160, 60, 3);
   for (const Floor& frame : screen.frames) {
     picture.fill(frame.planes());
     ASSERT_TRUE(engine.push(picture.in()).ok());
@@ -245,7 +245,7 @@ TEST(Ignored, ChangesFromFrameToFrame) {
   options.window_size = 20;
   Engine engine;
   ASSERT_TRUE(engine.configure(options, 160, 120).ok());
-  Picture picture(160, 120, 3);
+  PackedPicture picture(160, 120, 3);
   int left = 0;
   const auto pop = [&] {
     for (; engine.ready(); ++left) {

@@ -13,7 +13,7 @@ namespace {
 constexpr int kWidth = 32, kHeight = 24;
 
 void push(Engine& engine, int t, bool pop = true) {
-  Picture picture(kWidth, kHeight);
+  PackedPicture picture(kWidth, kHeight);
   for (size_t c = 0; c < 3; ++c)
     for (size_t p = 0; p < picture.pixels(); ++p)
       picture.at(c, p) = static_cast<uint8_t>(

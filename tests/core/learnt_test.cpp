@@ -22,7 +22,7 @@ struct Box {
   }
   std::vector<std::vector<uint8_t>> push(const std::vector<uint8_t>& planes,
                                          Output output = Output::background) {
-    Picture picture(width, height);
+    PackedPicture picture(width, height);
     picture.fill(planes);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     return pop(output);
@@ -30,14 +30,14 @@ struct Box {
   std::vector<std::vector<uint8_t>> pop(Output output = Output::background) {
     std::vector<std::vector<uint8_t>> all;
     while (engine.ready()) {
-      Picture out(width, height);
+      PackedPicture out(width, height);
       engine.pop(output, out.out());
       all.push_back(out.planes());
     }
     return all;
   }
   std::vector<uint8_t> background() {
-    Picture out(width, height);
+    PackedPicture out(width, height);
     EXPECT_TRUE(engine.write_background(out.out()));
     return out.planes();
   }
@@ -186,7 +186,7 @@ TEST(Learnt, WhileLiveLosesNoFrame) {
   Box box(kWidth, kHeight, options);
   size_t frames = 0;
   for (int t = 0; t < 200; ++t) {
-    Picture picture(kWidth, kHeight);
+    PackedPicture picture(kWidth, kHeight);
     picture.fill(scene(20));
     ASSERT_TRUE(box.engine.push(picture.in()).ok());
     // Between a frame and its picture, too.

@@ -34,7 +34,7 @@ struct Spread {
 
   // True where a model was published.
   bool push(const std::vector<uint8_t>& frame) {
-    Picture picture(static_cast<int>(pixels), 1);
+    PackedPicture picture(static_cast<int>(pixels), 1);
     picture.fill(frame);
     const uint64_t solves = background.solves();
     Queue queue;
@@ -221,7 +221,7 @@ struct Large {
   static constexpr int kWidth = 1024, kHeight = 1024;
   EngineOptions options = live_of(13, 4);
   Engine engine;
-  Picture picture{kWidth, kHeight, 3}, out{kWidth, kHeight, 3};
+  PackedPicture picture{kWidth, kHeight, 3}, out{kWidth, kHeight, 3};
 
   explicit Large(int threads) {
     options.threads = threads;

@@ -155,13 +155,13 @@ TEST(Engine, ThreadsChangeNoByte) {
         std::vector<std::vector<uint8_t>> all;
         const auto take = [&] {
           while (engine.ready()) {
-            Picture picture(width, height, 3);
+            PackedPicture picture(width, height, 3);
             engine.pop(output, picture.out());
             all.push_back(picture.bytes);
           }
         };
         for (const auto& frame : frames) {
-          Picture picture(width, height, 3);
+          PackedPicture picture(width, height, 3);
           picture.fill(frame);
           ASSERT_TRUE(engine.push(picture.in()).ok());
           take();
@@ -190,7 +190,7 @@ TEST(EngineLive, LargePicturesWithAndWithoutGaps) {
       Engine engine;
       ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
       for (size_t t = 0; t < 4; ++t) {
-        Picture in(kWidth, kHeight, bytes, false, padding),
+        PackedPicture in(kWidth, kHeight, bytes, false, padding),
             out(kWidth, kHeight, bytes, false, padding);
         in.fill(clip.frames[t]);
         ASSERT_TRUE(engine.push(in.in()).ok());
@@ -217,7 +217,7 @@ TEST(EngineLive, AlphaGoesWithItsFrame) {
   Engine engine;
   ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   for (int t = 0; t < 24; ++t) {
-    Picture in(kWidth, kHeight, 4, true), out(kWidth, kHeight, 4, true);
+    PackedPicture in(kWidth, kHeight, 4, true), out(kWidth, kHeight, 4, true);
     for (uint8_t& byte : in.bytes) byte = static_cast<uint8_t>(rng() >> 9);
     const auto constant = static_cast<uint8_t>(10 * t);
     // Alpha that varies, that is constant, and that varies in the last pixel only.

@@ -101,7 +101,7 @@ std::vector<std::vector<uint8_t>> pictures(const std::vector<std::vector<uint8_t
   options.threads = threads;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, width, height).ok());
-  Picture picture(width, height, 4, false, 4);
+  PackedPicture picture(width, height, 4, false, 4);
   for (const auto& planes : frames) {
     picture.fill(planes);
     EXPECT_TRUE(engine.push(picture.in()).ok());

@@ -20,7 +20,7 @@ struct Floor {
   }
   size_t pixels() const { return level[0].size(); }
   size_t index(int x, int y) const { return static_cast<size_t>(y * width + x); }
-  // Planes one after the other, as Picture::fill() has them.
+  // Planes one after the other, as PackedPicture::fill() has them.
   std::vector<uint8_t> planes() const {
     std::vector<uint8_t> all;
     for (const auto& plane : level) all.insert(all.end(), plane.begin(), plane.end());

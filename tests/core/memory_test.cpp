@@ -27,6 +27,7 @@ struct Case {
   int width = 320, height = 240, window = 100, threads = 1;
   double rate = 0;  // frames per second: known, some come while a window is solved
   int softness = 0;
+  int depth = 8;
 };
 
 EngineOptions options_of(const Case& c) {
@@ -38,6 +39,7 @@ EngineOptions options_of(const Case& c) {
   options.threads = c.threads;
   options.frame_rate = c.rate;
   options.mask_softness = c.softness;
+  options.depth = c.depth;
   return options;
 }
 
@@ -49,12 +51,35 @@ std::string describe(const Case& c) {
   return name + (c.mode == Mode::live ? " live " : " batch ") + std::to_string(c.width) + "x" +
          std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
          std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)] +
-         (c.rate > 0 ? ", solved beside" : "") + (c.softness > 0 ? ", soft" : "");
+         (c.rate > 0 ? ", solved beside" : "") + (c.softness > 0 ? ", soft" : "") +
+         (c.depth > 8 ? ", " + std::to_string(c.depth) + " bits" : "");
+}
+
+// The same picture in whole samples, whose low bits are noise.
+PackedPicture deepened(const PackedPicture& from, int depth) {
+  PackedPicture to(from.width, from.height, 2 * from.bytes_per_pixel);
+  std::minstd_rand random(7);
+  for (size_t i = 0; i < from.bytes.size(); ++i) {
+    const auto sample =
+        static_cast<unsigned>(from.bytes[i]) << (depth - 8) | (random() >> 8) % (1u << (depth - 8));
+    to.bytes[2 * i] = static_cast<uint8_t>(sample & 255);
+    to.bytes[2 * i + 1] = static_cast<uint8_t>(sample >> 8);
+  }
+  return to;
+}
+template <typename Byte>
+BasicImageView<Byte> deep_view(PackedPicture& picture, const Case& c) {
+  auto view = picture.view<Byte>();
+  for (int channel = 0; channel < 3; ++channel)
+    view.channel[channel] = picture.bytes.data() + 2 * channel;
+  if (c.alpha != Alpha::none) view.alpha = picture.bytes.data() + 6;
+  view.bits = {c.depth, 0};
+  return view;
 }
 
 // A light that goes up and down, something that moves, and noise, which makes the frames linearly
 // independent: all that a solve may need memory for.
-void paint(int t, Alpha alpha, Picture* picture) {
+void paint(int t, Alpha alpha, PackedPicture* picture) {
   std::minstd_rand random(static_cast<unsigned>(t) + 1);
   for (int y = 0; y < picture->height; ++y)
     for (int x = 0; x < picture->width; ++x) {
@@ -72,7 +97,7 @@ void paint(int t, Alpha alpha, Picture* picture) {
 }
 
 // Another scene: bars, where there are columns else.
-void turn(Picture* picture) {
+void turn(PackedPicture* picture) {
   for (size_t p = 0; p < picture->pixels(); ++p) {
     const size_t y = p / static_cast<size_t>(picture->width);
     for (size_t c = 0; c < 3; ++c)
@@ -84,9 +109,10 @@ void turn(Picture* picture) {
 // what else can be asked. Returns the bytes that the engine says it takes.
 double run(const Case& c) {
   const allocator::Unseen unseen;
-  Picture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
+  PackedPicture picture(c.width, c.height, c.alpha == Alpha::none ? 3 : 4, c.alpha != Alpha::none);
   const auto pixels = picture.pixels();
   std::vector<uint8_t> mask(pixels), residual(pixels);
+  PackedPicture deep = deepened(picture, c.depth);
   const auto see = [](auto work) {
     const allocator::SeenAgain again;
     work();
@@ -100,12 +126,18 @@ double run(const Case& c) {
     see([&] { engine.foreground(mask.data(), residual.data()); });
     while (engine.ready()) see([&] { engine.pop(Output::mask, picture.out()); });
     see([&] { engine.write_background(picture.out()); });
+    if (c.depth > 8) see([&] { engine.write_background(deep_view<uint8_t>(deep, c)); });
   };
   const auto stream = [&](int frames, int others) {
     for (int t = 0; t < (others > 0 ? c.window + others : 0) + frames; ++t) {
       paint(t, c.alpha, &picture);
       if (t >= c.window && t < c.window + others) turn(&picture);
-      see([&] { status = engine.push(picture.in()); });
+      if (c.depth > 8) {
+        deep = deepened(picture, c.depth);
+        see([&] { status = engine.push(deep_view<const uint8_t>(deep, c)); });
+      } else {
+        see([&] { status = engine.push(picture.in()); });
+      }
       EXPECT_TRUE(status.ok()) << status.message;
       pop();
     }
@@ -209,6 +241,19 @@ TEST(Memory, OfTheDefaultSolvedBeside) {
         }
 }
 
+TEST(Memory, OfMoreThan8Bits) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (Method method : {Method::robust, Method::qdmd, Method::dmd})
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (Alpha alpha : {Alpha::none, Alpha::varying}) {
+        Case c;
+        c.method = method, c.mode = mode, c.alpha = alpha;
+        c.width = 200, c.height = 150, c.window = 60, c.threads = 2;
+        c.depth = alpha == Alpha::none ? 10 : 16;
+        check(c);
+      }
+}
+
 TEST(Memory, OfSoftMasks) {
   if (!allocator::sees_all()) GTEST_SKIP();
   for (Mode mode : {Mode::batch, Mode::live}) {
@@ -229,7 +274,7 @@ TEST(Memory, OfSoftMasksCountsOnceThereAreAny) {
   const uint64_t before = engine.bytes();
   engine.set_mask_softness(2);
   EXPECT_EQ(engine.bytes(), before);
-  Picture picture(c.width, c.height, 3);
+  PackedPicture picture(c.width, c.height, 3);
   for (int t = 0; t < 2; ++t) {
     paint(t, Alpha::none, &picture);
     ASSERT_TRUE(engine.push(picture.in()).ok());

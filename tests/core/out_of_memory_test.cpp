@@ -57,8 +57,8 @@ std::string describe(const Case& c) {
 }
 
 // A textured still picture under a light that changes, and a square that moves.
-std::vector<Picture> make_frames(Alpha alpha, int width, int height) {
-  std::vector<Picture> frames;
+std::vector<PackedPicture> make_frames(Alpha alpha, int width, int height) {
+  std::vector<PackedPicture> frames;
   for (int t = 0; t < 8; ++t) {
     frames.emplace_back(width, height, alpha == Alpha::none ? 3 : 4, alpha != Alpha::none);
     for (int y = 0; y < height; ++y)
@@ -79,7 +79,7 @@ std::vector<Picture> make_frames(Alpha alpha, int width, int height) {
 }
 
 // Those of both sizes.
-using FramePair = std::pair<std::vector<Picture>, std::vector<Picture>>;
+using FramePair = std::pair<std::vector<PackedPicture>, std::vector<PackedPicture>>;
 const FramePair& frames_of(Alpha alpha) {
   static const auto make = [](Alpha a) {
     return FramePair(make_frames(a, kWidth, kHeight), make_frames(a, kSmallWidth, kSmallHeight));
@@ -118,8 +118,8 @@ class Owner {
     time_ = 0;
   }
   void push(bool look = false) {
-    const Picture& frame = frames()[static_cast<size_t>(time_++) % frames().size()];
-    const ImageView view = const_cast<Picture&>(frame).in();
+    const PackedPicture& frame = frames()[static_cast<size_t>(time_++) % frames().size()];
+    const ImageView view = const_cast<PackedPicture&>(frame).in();
     const Status status = call([&] { return engine_->push(view); });
     if (status.ok()) ++waiting_;
     take(status);
@@ -131,8 +131,8 @@ class Owner {
   void pop(bool look = false) {
     if (!engine_->ready()) return;
     if (look) call([&] { engine_->foreground(mask_.data(), residual_.data()); });
-    Picture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
-                frames()[0].with_alpha);
+    PackedPicture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
+                      frames()[0].with_alpha);
     while (engine_->ready()) {
       call([&] { engine_->pop(case_.output, out.out()); });
       --waiting_;
@@ -174,8 +174,8 @@ class Owner {
   }
   // What is ready must be there, too, after a failure.
   void pop_what_is_ready() {
-    Picture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
-                frames()[0].with_alpha);
+    PackedPicture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
+                      frames()[0].with_alpha);
     for (int most = 2 * kWindow; engine_->ready() && most > 0; --most)
       call([&] { engine_->pop(case_.output, out.out()); });
     EXPECT_FALSE(engine_->ready());
@@ -184,14 +184,14 @@ class Owner {
   std::vector<std::vector<uint8_t>> pictures;
 
  private:
-  const std::vector<Picture>& frames() const { return small_ ? small_frames_ : frames_; }
+  const std::vector<PackedPicture>& frames() const { return small_ ? small_frames_ : frames_; }
 
   // What a call to the engine refuses, it says for want of memory only where this is thrown.
   static void take(const Status& status) { EXPECT_TRUE(status.ok()) << status.message; }
 
   Case case_;
   Engine* engine_;
-  const std::vector<Picture>&frames_, &small_frames_;
+  const std::vector<PackedPicture>&frames_, &small_frames_;
   std::vector<uint8_t> mask_, residual_;
   int waiting_ = 0, time_ = 0;
   bool small_ = false, keep_ = true;

@@ -153,7 +153,7 @@ class Both {
     EXPECT_EQ(a.window_frames, b.window_frames);
     EXPECT_EQ(a.foreground.threshold, b.foreground.threshold);
     EXPECT_EQ(a.foreground.ratio, b.foreground.ratio);
-    Picture newest[2] = {{kPixels, 1}, {kPixels, 1}};
+    PackedPicture newest[2] = {{kPixels, 1}, {kPixels, 1}};
     const bool known = at_once.engine().write_background(newest[0].out());
     EXPECT_EQ(known, paced.engine().write_background(newest[1].out()));
     EXPECT_EQ(newest[0].planes(), newest[1].planes());

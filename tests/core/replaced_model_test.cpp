@@ -48,7 +48,7 @@ TEST(Background, ModelThatIsNoNumberIsReplacedByTheMean) {
       Background background(std::make_unique<BrokenLearner>(options, kPixels, number, &broken),
                             {&frames, kFrames, models, &workers.pool(), &clock});
       for (int t = 0; t < kFrames; ++t) {
-        Picture picture(kPixels, 1);
+        PackedPicture picture(kPixels, 1);
         for (size_t p = 0; p < kPixels; ++p)
           for (size_t c = 0; c < 3; ++c)
             picture.at(c, p) = static_cast<uint8_t>(p + 20 * c + 40 * static_cast<size_t>(t));

@@ -20,7 +20,7 @@ float norm(const int (&d)[3]) {
 
 // A frame and a reference of which parts are alike.
 struct Case {
-  Reference reference;
+  ReferencePicture reference;
   std::vector<uint8_t> frame[3];
 
   Case(int width, int height, std::mt19937& rng, float gain = 1) {
@@ -59,7 +59,7 @@ struct Mask {
 };
 
 Mask naive_mask(const Case& c, const Gain& gain) {
-  const Reference& r = c.reference;
+  const ReferencePicture& r = c.reference;
   const bool lit = is_lit(gain);
   std::vector<int> residual(r.pixels());
   for (size_t p = 0; p < r.pixels(); ++p) {
@@ -175,7 +175,7 @@ struct MaskedWindow {
   Window window;
   WindowMask mask;
   std::vector<Gain> gains;
-  Reference reference;
+  ReferencePicture reference;
   std::vector<uint8_t> reach;
 
   // share: of the samples, in per cent, that are masked; the first pixels are masked in all

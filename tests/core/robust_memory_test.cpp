@@ -240,7 +240,7 @@ std::vector<int> solved_frames(const Clip &clip) {
   std::vector<int> frames;
   uint64_t solves = 0;
   for (size_t t = 0; t < clip.size(); ++t) {
-    Picture picture(kWidth, kHeight);
+    PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     engine.pop(Output::background, picture.out());

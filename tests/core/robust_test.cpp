@@ -301,7 +301,7 @@ TEST(RobustWindows, AFlushForgets) {
     std::vector<uint8_t> last;
     const auto take = [&] {
       while (engine.ready()) {
-        Picture picture(kWidth, kHeight);
+        PackedPicture picture(kWidth, kHeight);
         engine.pop(Output::background, picture.out());
         last = picture.planes();
       }
@@ -312,7 +312,7 @@ TEST(RobustWindows, AFlushForgets) {
         ASSERT_TRUE(engine.drain().ok());
         take();
       }
-      Picture picture(kWidth, kHeight);
+      PackedPicture picture(kWidth, kHeight);
       picture.fill(clip.frames[t]);
       ASSERT_TRUE(engine.push(picture.in()).ok());
       take();
@@ -358,7 +358,7 @@ TEST(RobustEngine, LiveEveryFrameComesOut) {
   Engine engine;
   ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   for (size_t t = 0; t < clip.size(); ++t) {
-    Picture picture(kWidth, kHeight);
+    PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     ASSERT_TRUE(engine.push(picture.in()).ok());
     ASSERT_TRUE(engine.ready());
@@ -438,13 +438,13 @@ TEST(RobustEngine, HardCasesPass) {
         std::vector<std::vector<uint8_t>> pictures;
         const auto take = [&] {
           while (engine.ready()) {
-            Picture picture(pixels / height, height);
+            PackedPicture picture(pixels / height, height);
             engine.pop(Output::background, picture.out());
             pictures.push_back(picture.planes());
           }
         };
         for (const auto& frame : clip.frames) {
-          Picture picture(pixels / height, height);
+          PackedPicture picture(pixels / height, height);
           picture.fill(frame);
           ASSERT_TRUE(engine.push(picture.in()).ok());
           take();

@@ -37,13 +37,13 @@ inline std::vector<std::vector<uint8_t>> run_engine(const Clip& clip, int width,
   EXPECT_TRUE(status.ok()) << status.message;
   const auto take = [&] {
     while (engine.ready()) {
-      Picture picture(width, height);
+      PackedPicture picture(width, height);
       engine.pop(output, picture.out());
       all.push_back(picture.planes());
     }
   };
   for (const auto& frame : clip.frames) {
-    Picture picture(width, height);
+    PackedPicture picture(width, height);
     picture.fill(frame);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     take();

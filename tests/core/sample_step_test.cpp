@@ -20,13 +20,13 @@ std::vector<std::vector<uint8_t>> run(const Clip& clip, const Size& size,
   std::vector<std::vector<uint8_t>> all;
   const auto take = [&] {
     while (engine.ready()) {
-      Picture picture(size.width, size.height, 3);
+      PackedPicture picture(size.width, size.height, 3);
       engine.pop(Output::background, picture.out());
       all.push_back(picture.planes());
     }
   };
   for (const auto& frame : clip.frames) {
-    Picture picture(size.width, size.height, 3);
+    PackedPicture picture(size.width, size.height, 3);
     picture.fill(frame);
     EXPECT_TRUE(engine.push(picture.in()).ok());
     take();
@@ -132,7 +132,7 @@ TEST(SampleStep, DrainFlushAndFreezeKeepSamplesInStep) {
       for (size_t last : {1, 2, 3, 5, 8, 13}) {
         Engine engine;
         ASSERT_TRUE(engine.configure(options, size.width, size.height).ok());
-        Picture picture(size.width, size.height, 3);
+        PackedPicture picture(size.width, size.height, 3);
         std::vector<std::vector<uint8_t>> out;
         const auto push = [&](size_t t) {
           picture.fill(clip.frames[t]);
@@ -183,7 +183,7 @@ TEST(SampleStep, SamplesAfterAFreeze) {
     for (size_t length : {1, 2, 7}) {
       Engine engine;
       ASSERT_TRUE(engine.configure(options, size.width, size.height).ok());
-      Picture picture(size.width, size.height, 3);
+      PackedPicture picture(size.width, size.height, 3);
       for (size_t t = 0; t < begin + length + 4; ++t) {
         engine.set_freeze(t >= begin && t < begin + length);
         picture.fill(clip.frames[t]);

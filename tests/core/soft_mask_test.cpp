@@ -403,7 +403,7 @@ Shown last_of(const Floor& floor, const Floor& frame, Output output, int softnes
   EXPECT_TRUE(engine.configure(options, floor.width, floor.height).ok());
   engine.set_mask_softness(softness);
   engine.set_shadows(shadows);
-  Picture picture(floor.width, floor.height, 4, with_alpha);
+  PackedPicture picture(floor.width, floor.height, 4, with_alpha);
   Shown out;
   for (int t = 0; t < 20; ++t) {
     picture.fill((t < 19 ? floor : frame).planes());
@@ -491,7 +491,7 @@ TEST(SoftMask, IsNeverDarkerThanAMark) {
                      nullptr,
                      255};
   task.soft = true;
-  Picture picture(256, 1, 3);
+  PackedPicture picture(256, 1, 3);
   write_output(task, picture.out(), 0, 1);
   for (size_t p = 0; p < 256; ++p) ASSERT_EQ(picture.at(1, p), std::max<size_t>(p, 127));
 }

@@ -317,7 +317,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
     engine.set_time_budget(allowed);
     std::mt19937 rng(7);
-    std::vector<Picture> frames;
+    std::vector<PackedPicture> frames;
     for (int k = 0; k < 12; ++k) {
       frames.emplace_back(kSide, kSide);
       std::vector<uint8_t> planes(size_t{3} * kSide * kSide);
@@ -325,7 +325,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
       frames.back().fill(planes);
     }
     Outcome outcome;
-    Picture out(kSide, kSide);
+    PackedPicture out(kSide, kSide);
     const auto timed = [&](const auto& work) {
       const auto start = std::chrono::steady_clock::now();
       work();
@@ -411,7 +411,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfEngine,
 struct Separator {
   static constexpr int kSide = 64, kSamples = 3 * kSide * kSide;
   Engine engine;
-  Picture frame{kSide, kSide}, out{kSide, kSide};
+  PackedPicture frame{kSide, kSide}, out{kSide, kSide};
 
   Separator(Mode mode, int window, int hop = 0, int threads = 1) {
     EngineOptions options;

@@ -112,6 +112,20 @@ TEST(Broken, WhatTheElementRefusesIsSaid) {
   }
 }
 
+TEST(Broken, ADiskThatIsFullIsSaid) {
+  const Folder data, out;
+  write_sequence(data / "s", 6);
+  const std::string command = std::string(std::getenv("QDMD_EVALUATE")) + " --dataset " +
+                              data.string() + " --methods mean >/dev/full 2>" +
+                              (out / "err").string();
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+  std::ifstream file(out / "err");
+  const std::string said{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_NE(said.find("cannot write the table"), std::string::npos) << said;
+}
+
 // ---- Wrong options ----
 
 TEST(Options, WrongOnesEndWithTwoAndAReason) {

@@ -166,7 +166,9 @@ int evaluate(const Options& options) {
   progress.end();
   write_table(rows, kFormats.at(options.format), std::cout);
   std::cout.flush();
-  return std::cout && progress.problems() == 0 ? 0 : 1;
+  if (!std::cout)
+    throw std::runtime_error("cannot write the table: make room where standard output goes");
+  return progress.problems() == 0 ? 0 : 1;
 }
 
 }  // namespace

@@ -13,9 +13,9 @@ import time
 import common
 
 # demo.sh installs packages and builds: continuous integration runs it after these tests.
-# subtract.cpp is built and run by tests/install.
-KNOWN = {'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'subtract.cpp', 'two_pads.cpp',
-         'watch.py'}
+# subtract.cpp is built and run by tests/install, archive by tests/archive.
+KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'subtract.cpp',
+         'two_pads.cpp', 'watch.py'}
 WIDTH, HEIGHT = 320, 240
 
 root, embed, demo, two_pads = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])

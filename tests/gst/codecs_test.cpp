@@ -103,8 +103,11 @@ TEST_P(Codecs, PlayWithoutAConversion) {
 
 INSTANTIATE_TEST_SUITE_P(
     Encoders, Codecs,
-    testing::Values(Codec{"x264", "x264enc", "x264enc speed-preset=ultrafast ! h264parse", "I420"},
-                    Codec{"x265", "x265enc", "x265enc speed-preset=ultrafast ! h265parse", "I420"}),
+    testing::Values(
+        Codec{"x264", "x264enc", "x264enc speed-preset=ultrafast ! h264parse", "I420"},
+        Codec{"x265", "x265enc", "x265enc speed-preset=ultrafast ! h265parse", "I420"},
+        Codec{"x264_10", "x264enc", "x264enc speed-preset=ultrafast ! h264parse", "I420_10LE"},
+        Codec{"x265_10", "x265enc", "x265enc speed-preset=ultrafast ! h265parse", "I420_10LE"}),
     [](const auto& codec) { return codec.param.name; });
 
 }  // namespace

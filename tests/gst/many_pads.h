@@ -35,9 +35,10 @@ inline std::vector<uint8_t> samples_of(GstBuffer* buffer, const GstCaps* caps) {
   for (guint c = 0; c < GST_VIDEO_FRAME_N_COMPONENTS(&frame); ++c)
     for (int y = 0; y < GST_VIDEO_FRAME_COMP_HEIGHT(&frame, c); ++y)
       for (int x = 0; x < GST_VIDEO_FRAME_COMP_WIDTH(&frame, c); ++x)
-        samples.push_back(static_cast<const uint8_t*>(
-            GST_VIDEO_FRAME_COMP_DATA(&frame, c))[y * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c) +
-                                                  x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c)]);
+        for (int byte = 0; byte < (GST_VIDEO_FRAME_COMP_DEPTH(&frame, c) > 8 ? 2 : 1); ++byte)
+          samples.push_back(static_cast<const uint8_t*>(GST_VIDEO_FRAME_COMP_DATA(
+              &frame, c))[y * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c) +
+                          x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c) + byte]);
   gst_video_frame_unmap(&frame);
   return samples;
 }

@@ -44,6 +44,27 @@ std::vector<int> run_clip(const char* output, GstVideoFormat format, int width, 
   return seen;
 }
 
+// Upstream that likes the deepest formats best, as videotestsrc does.
+TEST(Choice, IsOf8BitsWhereNobodyPrefersMore) {
+  for (const char* element : {"qdmdbackground", "qdmdseparate"}) {
+    GstElement* made = gst_element_factory_make(element, nullptr);
+    GstPad* sink = gst_element_get_static_pad(made, "sink");
+    const auto first_of = [&](const char* formats) {
+      GstCaps* filter =
+          gst_caps_from_string((std::string("video/x-raw,format=") + formats).c_str());
+      GstCaps* caps = gst_caps_fixate(gst_pad_query_caps(sink, filter));
+      const std::string first = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
+      gst_caps_unref(caps);
+      gst_caps_unref(filter);
+      return first;
+    };
+    EXPECT_EQ(first_of("{ARGB64,P010_10LE,RGBA,NV12}"), "RGBA") << element;
+    EXPECT_EQ(first_of("{ARGB64,P010_10LE}"), "ARGB64") << element;
+    gst_object_unref(sink);
+    gst_object_unref(made);
+  }
+}
+
 class Formats : public testing::TestWithParam<const char*> {};
 
 TEST_P(Formats, AllGiveTheSamePicturesAtAnyWidthAndStride) {
@@ -165,6 +186,93 @@ TEST(Limits, TooLargeAWindowIsAnErrorThatSaysWhatToChange) {
   EXPECT_EQ(GST_RESOURCE_ERROR_NO_SPACE_LEFT, code);
   EXPECT_NE(std::string::npos, text.find("window-size")) << text;
   EXPECT_NE(std::string::npos, text.find(std::to_string(3ull * 200 * 4096 * 2160))) << text;
+}
+
+// Of an element whose sink pad is given caps by hand.
+std::string said_of_caps(const std::string& launch, const std::string& text) {
+  GstElement* element = gst_parse_launch(launch.c_str(), nullptr);
+  GstBus* bus = gst_bus_new();
+  gst_element_set_bus(element, bus);
+  GstPad* sink = gst_element_get_static_pad(element, "sink");
+  gst_element_set_state(element, GST_STATE_PAUSED);
+  gst_pad_send_event(sink, gst_event_new_stream_start("limits"));
+  GstCaps* caps = gst_caps_from_string(text.c_str());
+  EXPECT_FALSE(gst_pad_send_event(sink, gst_event_new_caps(caps)));
+  gst_caps_unref(caps);
+  GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
+  std::string said;
+  if (message) {
+    GError* error = nullptr;
+    gst_message_parse_error(message, &error, nullptr);
+    EXPECT_TRUE(g_error_matches(error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NO_SPACE_LEFT));
+    said = error->message;
+    g_error_free(error);
+    gst_message_unref(message);
+  }
+  gst_element_set_state(element, GST_STATE_NULL);
+  gst_element_set_bus(element, nullptr);
+  gst_object_unref(bus);
+  gst_object_unref(sink);
+  gst_object_unref(element);
+  return said;
+}
+
+TEST(Limits, BytesThatNoMachineHasAreRefusedWithTheCaps) {
+  for (const char* size :
+       {"width=8192,height=8192", "width=65536,height=65536", "width=2147483647,height=2147483647",
+        "width=2147483647,height=1", "width=1,height=2147483647"})
+    for (const char* element : {"qdmdbackground", "qdmdseparate"})
+      for (const char* mode : {"batch", "live"})
+        for (const char* format : {"RGB", "RGBA", "I420", "GRAY8"}) {
+          const std::string said =
+              said_of_caps(std::string(element) + " window-size=2048 mode=" + mode,
+                           std::string("video/x-raw,framerate=25/1,format=") + format + "," + size);
+          for (const char* word : {"window-size", "max-memory"})
+            EXPECT_NE(std::string::npos, said.find(word))
+                << element << " " << mode << " " << format << " " << size << ": " << said;
+        }
+}
+
+// One lie of a buffer's metadata about where its planes are.
+struct Lie {
+  guint plane;
+  gsize offset;  // bytes more
+  gint stride;   // bytes more
+  guint planes;  // fewer
+  guint width;   // fewer
+};
+
+TEST(Limits, MetadataThatPointsOutsideOfItsBufferIsAnError) {
+  const Lie lies[] = {{0, 0, 1, 0, 0},        {0, 1 << 20, 0, 0, 0}, {0, 0, G_MAXINT / 2, 0, 0},
+                      {0, 0, G_MININT, 0, 0}, {0, 4, 0, 0, 0},       {0, 0, 0, 1, 0},
+                      {0, 0, 0, 0, 1}};
+  for (const char* launch : {"qdmdbackground window-size=2", "qdmdbackground mode=live"})
+    for (GstVideoFormat format :
+         {GST_VIDEO_FORMAT_RGB, GST_VIDEO_FORMAT_BGRA, GST_VIDEO_FORMAT_I420, GST_VIDEO_FORMAT_NV12,
+          GST_VIDEO_FORMAT_YUY2})
+      for (Lie lie : lies) {
+        Stream stream(launch, format, 40, 24);
+        // The last plane is the one that ends with the buffer.
+        lie.plane = stream.info().finfo->n_planes - 1;
+        gsize offset[GST_VIDEO_MAX_PLANES] = {};
+        gint stride[GST_VIDEO_MAX_PLANES] = {};
+        for (guint i = 0; i <= lie.plane; ++i) {
+          offset[i] = stream.info().offset[i];
+          stride[i] = stream.info().stride[i];
+        }
+        offset[lie.plane] += lie.offset;
+        stride[lie.plane] += lie.stride;
+        BufferPtr honest = make_bytes(stream.info(), 0), lying = make_bytes(stream.info(), 1);
+        stream.stamp(honest.get(), 0);
+        stream.stamp(lying.get(), 1);
+        gst_buffer_add_video_meta_full(lying.get(), GST_VIDEO_FRAME_FLAG_NONE, format,
+                                       40 - lie.width, 24, lie.plane + 1 - lie.planes, offset,
+                                       stride);
+        EXPECT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), honest.release()));
+        EXPECT_EQ(GST_FLOW_ERROR, gst_harness_push(stream.harness(), lying.release()))
+            << gst_video_format_to_string(format) << " offset +" << lie.offset << " stride +"
+            << lie.stride << " planes -" << lie.planes << " width -" << lie.width;
+      }
 }
 
 TEST(Limits, TheAdjointSolverRefusesWhatItCannotHold) {

@@ -62,6 +62,35 @@ TEST(Formats, AMaskMayBeGreyBesideAnyPicture) {
   EXPECT_GT(white, 0u);
 }
 
+TEST(Formats, AGreyMaskOfDeepVideoHas8Bits) {
+  Rig rig(std::string("qdmdseparate shadows=foreground") + kSmall);
+  rig.listen("background", "video/x-raw,format=P010_10LE");
+  rig.listen("mask", "video/x-raw,format=GRAY8");
+  Rig luma(std::string("qdmdbackground output=mask shadows=foreground") + kSmall);
+  luma.listen("src");
+  for (Rig* one : {&rig, &luma}) {
+    one->start(GST_VIDEO_FORMAT_I420_10LE, 30, 22);
+    for (int t = 0; t < 12; ++t) ASSERT_EQ(GST_FLOW_OK, one->push(t));
+  }
+  const auto background = rig.at("background").take(), mask = rig.at("mask").take(),
+             expected = luma.at("src").take();
+  ASSERT_EQ(background.size(), mask.size());
+  ASSERT_EQ(expected.size(), mask.size());
+  ASSERT_FALSE(mask.empty());
+  EXPECT_NE(std::string::npos, background[0].caps.find("P010_10LE"));
+  size_t white = 0;
+  for (size_t i = 0; i < mask.size(); ++i)
+    for (size_t y = 0; y < 22; ++y)
+      for (size_t x = 0; x < 30; ++x) {
+        const int seen = mask[i].bytes[30 * y + x];
+        const auto* word = expected[i].bytes.data() + 60 * y + 2 * x;
+        ASSERT_EQ(seen == 255 ? 940 : 64, word[0] | word[1] << 8);
+        ASSERT_TRUE(seen == 0 || seen == 255);
+        white += seen == 255;
+      }
+  EXPECT_GT(white, 0u);
+}
+
 TEST(Formats, ACutOutMayBeTransparentWhereTheVideoIsNot) {
   Rig rig(std::string("qdmdseparate") + kSmall);
   rig.listen("mask");

@@ -159,7 +159,7 @@ TEST(Stabilize, WithoutRoomThereIsOneWarning) {
 TEST(Stabilize, EveryOutputComesSteadyOrNot) {
   for (const char* output : {"background", "foreground", "mask", "cutout"})
     for (const char* steady : {"true", "false"})
-      for (const char* form : {"RGB", "ARGB", "I420", "YUY2"})
+      for (const char* form : {"RGB", "ARGB", "I420", "YUY2", "P010_10LE", "I420_10LE"})
         run("basic,jitter=2",
             std::string(
                 "regions=true mask-softness=3 shadows=marked stabilize=similarity output=") +

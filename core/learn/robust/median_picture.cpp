@@ -9,9 +9,19 @@ namespace qdmd {
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
                     uint8_t* spread) {
+  median_picture(grid, Band(grid.height), stable, frames, pool, background, spread);
+}
+
+void median_picture(const Grid& grid, const Band& band, const StableFrames& stable,
+                    const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
+                    uint8_t* spread) {
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
+    // Of the rows that are kept.
+    const int top = std::max(grid.top(row) - band.first(), 0),
+              bottom = std::min(grid.top(row + 1) - band.first(), band.rows());
+    if (top >= bottom) return;
     for (int col = 0; col < grid.cols; ++col) {
       const auto shown =
           stable.of_cell[part * static_cast<size_t>(grid.cols) + static_cast<size_t>(col)];
@@ -28,7 +38,7 @@ void median_picture(const Grid& grid, const StableFrames& stable,
       }
       const int left = grid.left(col), right = grid.left(col + 1);
       const int width = std::min(kMedianBlock, right - left), height = kMedianBlock / width;
-      for (int y = grid.top(row); y < grid.top(row + 1); y += height)
+      for (int y = top; y < bottom; y += height)
         for (int x = left; x < right; x += width) {
           const auto first =
               static_cast<size_t>(y) * static_cast<size_t>(grid.width) + static_cast<size_t>(x);
@@ -37,7 +47,7 @@ void median_picture(const Grid& grid, const StableFrames& stable,
           uint8_t* const out[3] = {background[0] + first, background[1] + first,
                                    background[2] + first};
           median_block(rows, inverse, count, static_cast<size_t>(std::min(width, right - x)),
-                       static_cast<size_t>(std::min(height, grid.top(row + 1) - y)),
+                       static_cast<size_t>(std::min(height, bottom - y)),
                        static_cast<size_t>(grid.width), out, spread + first);
         }
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "core/dmd/qdmd.h"
@@ -47,18 +48,21 @@ void divide_time(int stride, DmdSummary* summary) {
 
 }  // namespace
 
-RobustLearner::RobustLearner(const LearnOptions& options, int width, int height,
+RobustLearner::RobustLearner(const LearnOptions& options, int width, const Band& band,
                              const RobustParameters& parameters)
     : options_(options),
       parameters_(parameters),
-      grid_(width, height, parameters.cells_along),
-      finest_step_(options.sample_step > 0 ? options.sample_step : chosen_step(width, height)),
+      band_(band),
+      grid_(width, band.height(), parameters.cells_along),
+      finest_step_(options.sample_step > 0 ? options.sample_step
+                                           : chosen_step(width, band.height())),
       step_(finest_step_) {
   // What the paper fits to the first frame depends on what stood there.
   options_.dmd.amplitude = Amplitude::window;
   if (options_.dmd.rank == 0) options_.dmd.rank = 1;
   reference_.width = width;
-  reference_.height = height;
+  reference_.height = band.rows();
+  if (!options.remembers) parameters_.earlier_share = parameters_.remembered_share = 0;
 }
 
 std::vector<int> RobustLearner::sample_steps() const {
@@ -74,7 +78,12 @@ int RobustLearner::remembered_frames(int window_size) const {
 }
 
 size_t RobustLearner::samples_at(int step) const {
-  return sample_count(grid_.width, grid_.height, step);
+  return static_cast<size_t>(band_.samples(step)) * sample_count(grid_.width, step);
+}
+
+// Own rows, counted among those that are kept.
+SampledRows RobustLearner::sampled_rows() const {
+  return {band_.first_sample(step_) - band_.first(), band_.own_end() - band_.first(), step_};
 }
 
 uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) const {
@@ -107,7 +116,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          GridFrames::bytes(grid_, static_cast<int>(looks)) +
                          std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
-  const uint64_t filling = workers * Filler::bytes(window_size);
+  const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
   return kept + made + scene +
          std::max({start, masks, scene,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
@@ -136,7 +145,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
   light_scratch_ = LightScratch(grid_.cells());
-  earlier_ = Earlier(grid_);
+  earlier_ = EarlierWindow(grid_);
   looks_ = StandingLooks(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
@@ -240,6 +249,39 @@ void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, c
   calm_ = 0;
   model->freeze_but_for_light(frame.t);
   replace(cells, frame.around.every(2), light, model);
+  if (options_.low_bits() > 0)
+    replace_deep(cells, room_.frames->whole(frame.around.every(2)), light, model);
+}
+
+// The same of whole samples.
+void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRange& frames,
+                                 const Gain& light, BackgroundModel* model) const {
+  const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
+  const double unit = 1.0 / (1 << frames.low_bits());
+  for (int cell : cells) {
+    const int row = cell / grid_.cols, col = cell % grid_.cols;
+    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
+      for (int x = grid_.left(col); x < grid_.left(col + 1); ++x) {
+        const auto p =
+            static_cast<size_t>(y) * static_cast<size_t>(grid_.width) + static_cast<size_t>(x);
+        float level[kChannels];
+        for (int c = 0; c < kChannels; ++c) {
+          // In order: there are a few.
+          double samples[kMendingFrames];
+          for (int t = 0; t < frames.size(); ++t) {
+            const double sample = frames.sample(t, c, p);
+            int at = t;
+            for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
+            samples[at] = sample;
+          }
+          const double middle = (samples[(count - 1) / 2] + samples[half]) / 2;
+          const auto channel = static_cast<size_t>(c);
+          level[channel] = static_cast<float>(middle * unit / static_cast<double>(light[channel]));
+        }
+        const float* const out[3] = {&level[0], &level[1], &level[2]};
+        model->replace(p, 1, out);
+      }
+  }
 }
 
 // The median of the frames in place of the background of these cells.
@@ -257,7 +299,8 @@ void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& 
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;
     const int left = grid_.left(col), right = grid_.left(col + 1);
-    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
+    for (int y = std::max(grid_.top(row) - band_.first(), 0);
+         y < std::min(grid_.top(row + 1) - band_.first(), band_.rows()); ++y)
       for (int x = left; x < right; x += kMedianBlock) {
         const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
         const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
@@ -345,7 +388,7 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   uint8_t* background[kChannels];
   for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
   std::vector<uint8_t> spread(pixels());
-  median_picture(grid_, stable_, pictures, room_.pool, background, spread.data());
+  median_picture(grid_, band_, stable_, pictures, room_.pool, background, spread.data());
   recall_spread(&spread);
   blur(spread.data(), reference_.width, reference_.height, spread_.data());
   for (size_t p = 0; p < pixels(); ++p) {
@@ -364,7 +407,8 @@ void RobustLearner::recall_spread(std::vector<uint8_t>* spread) const {
     for (int col = 0; col < grid_.cols; ++col) {
       const auto frames = stable_.of_cell[static_cast<size_t>(row * grid_.cols + col)];
       if (frames.size() > 1 || frames.front() != start_frames_) continue;
-      for (int y = grid_.top(row); y < grid_.top(row + 1); ++y) {
+      for (int y = std::max(grid_.top(row) - band_.first(), 0);
+           y < std::min(grid_.top(row + 1) - band_.first(), band_.rows()); ++y) {
         const ptrdiff_t start = static_cast<ptrdiff_t>(y) * grid_.width;
         std::copy(earlier_.spread().begin() + start + grid_.left(col),
                   earlier_.spread().begin() + start + grid_.left(col + 1),
@@ -397,22 +441,31 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
                                    snapshots.plane(t, 2)};
       uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                                samples_.plane(slot, 2)};
-      fill_samples(reference_, mask_.of(t), x, gains_[part], reach_.data(), step_, out);
+      fill_samples(reference_, mask_.of(t), x, gains_[part], reach_.data(), sampled_rows(), out);
     });
     gram_.add_newest(samples_, samples_.size());
   }
   DmdOptions options = options_.dmd;
   options.omega_threshold *= stride_;
-  return qdmd::decompose(samples_, gram_.matrix(samples_), options);
+  const size_t seen = sample_count(grid_.width, grid_.height, step_);
+  return qdmd::decompose(samples_, gram_.matrix(samples_, band_.team()), options,
+                         static_cast<double>(seen));
 }
 
 // The modes' pictures from filled frames, run by run.
-void RobustLearner::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
+void RobustLearner::combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model) {
+  const SnapshotRange whole = room_.frames->whole(snapshots);
   std::vector<Filler> fillers;
-  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
+  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size(), deep);
   const size_t run = fillers[0].run();
   room_.pool->run((pixels() + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, pixels() - first);
+    if (deep) {
+      model->build_from(
+          fillers[worker].fill_deep(whole, gains_, mask_, reference_, reach_.data(), first, count),
+          first, count);
+      return;
+    }
     model->build_from(
         fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
         first, count);
@@ -434,13 +487,30 @@ void RobustLearner::take_reference(BackgroundModel* model, double t) {
 void RobustLearner::refine_light(const SnapshotRange& snapshots) {
   if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
   const Clock::Span span(*room_.clock, Clock::samples);
-  room_.pool->run(gains_.size(), [&](size_t part) {
-    const int t = static_cast<int>(part);
-    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                 snapshots.plane(t, 2)};
-    gains_[part] = refine_gain(reference_, x, gains_[part], step_);
-  });
+  std::vector<int> all(gains_.size());
+  std::iota(all.begin(), all.end(), 0);
+  refine_gains(snapshots, all, &gains_);
   settle_light(&gains_);
+}
+
+// refine_gain() of some frames, by the samples of all members.
+void RobustLearner::refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
+                                 std::vector<Gain>* gains) {
+  std::vector<GainSums> sums(frames.size());
+  std::vector<uint8_t> goes_on(frames.size(), 1);
+  const auto gain_of = [&](size_t i) -> Gain& { return (*gains)[static_cast<size_t>(frames[i])]; };
+  for (int round = 0; round < kGainRounds; ++round) {
+    room_.pool->run(frames.size(), [&](size_t i) {
+      const int t = frames[i];
+      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
+                                   snapshots.plane(t, 2)};
+      sums[i] = goes_on[i] ? gain_sums(reference_, x, gain_of(i), sampled_rows()) : GainSums{};
+    });
+    if (Team* team = band_.team(); team && !sums.empty())
+      team->sum(Talk::light, {sums.front().data(), sums.size() * sums.front().size()});
+    for (size_t i = 0; i < frames.size(); ++i)
+      if (goes_on[i]) goes_on[i] = refine_gain(sums[i], &gain_of(i));
+  }
 }
 
 void RobustLearner::decompose(const SnapshotRange& snapshots) {
@@ -467,10 +537,14 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       const Decomposition decomposition = decompose_filled(snapshots);
       facts_.dmd = decomposition.summary;
       divide_time(stride_, &facts_.dmd);
-      model->begin(snapshots, decomposition.background, true);
+      const bool deep = options_.low_bits() > 0 && iteration + 1 == options_.iterations;
+      // Where all is so dark that its highest bits are 0, they have no mode.
+      const bool dark = deep && facts_.dmd.background_modes == 0;
+      model->begin(snapshots, dark ? mean_of_frames(snapshots.size()) : decomposition.background,
+                   true);
       model->set_stride(stride_);
-      model->make_steady();
-      combine(snapshots, model);
+      if (!deep) model->make_steady();
+      combine(snapshots, deep, model);
       take_reference(model, snapshots_->size() / 2);
     }
     end(model);
@@ -482,8 +556,9 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
 }
 
 // Of all frames of the window: those between the snapshots have a light of their own.
-std::vector<Gain> RobustLearner::gains_of_frames() const {
+std::vector<Gain> RobustLearner::gains_of_frames() {
   if (stride_ == 1) return gains_;
+  std::vector<int> lit;
   std::vector<Gain> gains(static_cast<size_t>(snapshots_->size()), kSameLight);
   for (int t = 0; t < snapshots_->size(); ++t) {
     Gain& gain = gains[static_cast<size_t>(t)];
@@ -493,10 +568,9 @@ std::vector<Gain> RobustLearner::gains_of_frames() const {
     gain =
         light_between(room_.frames->cells(), snapshots_->slot(t), background_cells_, 1 - published_,
                       gains_[before], gains_[std::min(before + 1, gains_.size() - 1)]);
-    const uint8_t* const x[3] = {snapshots_->plane(t, 0), snapshots_->plane(t, 1),
-                                 snapshots_->plane(t, 2)};
-    if (is_lit(gain)) gain = refine_gain(reference_, x, gain, step_);
+    if (is_lit(gain)) lit.push_back(t);
   }
+  refine_gains(*snapshots_, lit, &gains);
   return gains;
 }
 
@@ -529,12 +603,13 @@ bool RobustLearner::is_calm() const {
 
 // What others ask the model, and what later windows are told.
 void RobustLearner::end(BackgroundModel* model) {
-  for (int c = 0; c < kChannels; ++c)
-    cell_means(grid_, reference_.level[static_cast<size_t>(c)].data(),
-               background_cells_.plane(1 - published_, c));
+  const uint8_t* const level[kChannels] = {reference_.level[0].data(), reference_.level[1].data(),
+                                           reference_.level[2].data()};
+  find_cells(grid_, band_, level, &background_cells_, 1 - published_);
   calm_ = is_calm() ? calm_ + 1 : 0;
   if (parameters_.earlier_share > 0)
-    earlier_.take(grid_, reference_, spread_, stable_, start_frames_, fresh_);
+    earlier_.take(grid_, reference_, spread_, background_cells_, 1 - published_, stable_,
+                  start_frames_, fresh_);
   model->set_gains(gains_of_frames());
   keep_some();
   std::copy(reference_.threshold.begin(), reference_.threshold.end(), model->make_limits());

@@ -9,7 +9,7 @@
 #include "core/gram/gram.h"
 #include "core/learn/learner.h"
 #include "core/learn/robust/absorbed.h"
-#include "core/learn/robust/earlier.h"
+#include "core/learn/robust/earlier_window.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/scene_watch.h"
@@ -44,14 +44,21 @@ struct RobustParameters {
 //   repeat   what differs from the picture is foreground (find_mask) and becomes background
 //            (Filler); Q-DMD of the filled window, of rank 1 unless another is asked for, with
 //            amplitudes fitted to all frames, is the next background
+// Of samples of more than 8 bits the start, masks and inner products see the highest eight; what is
+// filled and combined last has all bits.
 // Global changes of light are divided out before and put back in L(t). Inner products are taken
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
  public:
-  RobustLearner(const LearnOptions& options, int width, int height,
+  RobustLearner(const LearnOptions& options, int width, const Band& band,
                 const RobustParameters& parameters = {});
 
-  FrameContents contents() const override { return {1, parameters_.cells_along}; }
+  // Pixels of a band's background depend on rows so far from them.
+  static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
+
+  FrameContents contents() const override {
+    return {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+  }
   std::vector<int> sample_steps() const override;
   bool in_one_piece() const override { return true; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
@@ -87,23 +94,28 @@ class RobustLearner : public Learner {
  private:
   size_t pixels() const { return reference_.pixels(); }
   size_t samples_at(int step) const;
+  SampledRows sampled_rows() const;
   int remembered_frames(int window_size) const;
   // Of the first snapshot, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }
   void start(const SnapshotRange& snapshots);
   void refine_light(const SnapshotRange& snapshots);
+  void refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
+                    std::vector<Gain>* gains);
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
-  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
+  void combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
-  std::vector<Gain> gains_of_frames() const;
+  std::vector<Gain> gains_of_frames();
   void keep_some();
   void mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
             BackgroundModel* model);
   void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                BackgroundModel* model);
   bool is_calm() const;
+  void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
+                    BackgroundModel* model) const;
   void end(BackgroundModel* model);
 
   // Hops that are left out between two solves, at most.
@@ -111,13 +123,14 @@ class RobustLearner : public Learner {
 
   LearnOptions options_;
   RobustParameters parameters_;
-  Grid grid_;
+  Band band_;
+  Grid grid_;  // of the whole picture
   int finest_step_, step_;
   LearnerRoom room_ = {};
   GridFrames background_cells_;  // of the published and the newest solve, in unit light
   int published_ = 0;
   LightScratch light_scratch_;  // of light()
-  Earlier earlier_;
+  EarlierWindow earlier_;
   FrameMemory memory_;
   StandingLooks looks_;  // of the frames that were compared with the background in use
   int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
@@ -137,7 +150,7 @@ class RobustLearner : public Learner {
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
   StableFrames stable_;
-  Reference reference_;
+  ReferencePicture reference_;
   std::vector<uint8_t> spread_;  // quarters of a level, mean of 5 x 5
   std::vector<uint8_t> reach_;
   std::vector<Gain> gains_;  // of the snapshots

@@ -9,10 +9,10 @@ namespace qdmd {
 
 // A person who stands still through a whole window is background there. Where the window before had
 // seen what is behind, its picture takes part in the next start like one more frame of some weight.
-class Earlier {
+class EarlierWindow {
  public:
-  Earlier() = default;
-  explicit Earlier(const Grid& grid) : cells_(grid, 1) {}
+  EarlierWindow() = default;
+  explicit EarlierWindow(const Grid& grid) : cells_(grid, 1) {}
 
   bool known() const { return known_; }
   void forget() {
@@ -30,13 +30,15 @@ class Earlier {
   // Replaces what is known by a window's background and the frames that showed it; where these
   // include what was known (frame `count` of `stable`), it is confirmed. fresh: the share of the
   // window's frames that no window before had. spread: as median_picture() has it, blurred.
-  void take(const Grid& grid, const Reference& background, const std::vector<uint8_t>& spread,
+  // cells: the background's are picture `at` of them.
+  void take(const Grid& grid, const ReferencePicture& background,
+            const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
             const StableFrames& stable, int count, float fresh);
 
   // What is known, for a file and back; its grid may be another, and each cell then knows what the
   // one at its middle did. Where read() throws, all is as it was.
-  void write(const Grid& grid, Learnt::Earlier* out) const;
-  void read(const Grid& grid, const Learnt::Earlier& from);
+  void write(const Grid& grid, Learnt::EarlierWindow* out) const;
+  void read(const Grid& grid, const Learnt::EarlierWindow& from);
 
  private:
   bool known_ = false;  // set last: what follows is whole

@@ -1,4 +1,4 @@
-#include "core/learn/robust/earlier.h"
+#include "core/learn/robust/earlier_window.h"
 
 #include <algorithm>
 
@@ -12,19 +12,19 @@ int middle_in(int k, int ours, int theirs) {
 
 }  // namespace
 
-LitPicture Earlier::picture(const Gain& gain) const {
+LitPicture EarlierWindow::picture(const Gain& gain) const {
   return {{level_[0].data(), level_[1].data(), level_[2].data()}, gain};
 }
 
-Recollection Earlier::recollection(float most) const {
+Recollection EarlierWindow::recollection(float most) const {
   Recollection result = {weight_, limit_};
   for (float& weight : result.weight) weight = std::min(weight, most);
   return result;
 }
 
-void Earlier::take(const Grid& grid, const Reference& background,
-                   const std::vector<uint8_t>& spread, const StableFrames& stable, int count,
-                   float fresh) {
+void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
+                         const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
+                         const StableFrames& stable, int count, float fresh) {
   known_ = false;
   weight_.resize(grid.cells());
   for (size_t cell = 0; cell < grid.cells(); ++cell) {
@@ -37,12 +37,13 @@ void Earlier::take(const Grid& grid, const Reference& background,
   spread_ = spread;
   for (size_t c = 0; c < kChannels; ++c) {
     level_[c] = background.level[c];
-    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+    const int channel = static_cast<int>(c);
+    std::copy_n(cells.plane(at, channel), cells.cells(), cells_.plane(0, channel));
   }
   known_ = true;
 }
 
-void Earlier::write(const Grid& grid, Learnt::Earlier* out) const {
+void EarlierWindow::write(const Grid& grid, Learnt::EarlierWindow* out) const {
   for (size_t c = 0; c < kChannels; ++c) out->level[c] = level_[c];
   out->spread = spread_;
   out->rows = grid.rows;
@@ -51,7 +52,7 @@ void Earlier::write(const Grid& grid, Learnt::Earlier* out) const {
   out->limit = limit_;
 }
 
-void Earlier::read(const Grid& grid, const Learnt::Earlier& from) {
+void EarlierWindow::read(const Grid& grid, const Learnt::EarlierWindow& from) {
   // Memory first, and the old content stays until all of it is there.
   for (size_t c = 0; c < kChannels; ++c) level_[c].reserve(from.level[c].size());
   spread_.reserve(from.spread.size());

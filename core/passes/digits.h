@@ -1,0 +1,42 @@
+// Samples of more than 8 bits: as the two digits that frames are kept in, as numbers, and as the
+// words of video in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/image_view.h"
+
+namespace qdmd {
+
+// The high digit of a sample is its highest 8 bits, the low digit the `bits.low()` bits below them.
+// Distances between words are in bytes. 8-bit samples have no digits: bits.is_deep().
+
+// high[p], low[p] = the digits of the word at from + p * stride, p < count. Reads nothing behind
+// the last word.
+void split_digits(const uint8_t* from, ptrdiff_t stride, SampleBits bits, size_t count,
+                  uint8_t* high, uint8_t* low);
+// out[p] = high[p] 2^low_bits + low[p].
+void join_digits(const uint8_t* high, const uint8_t* low, int low_bits, size_t count,
+                 uint16_t* out);
+// The words at to + p * stride become the samples.
+void put_words(const uint16_t* samples, SampleBits bits, size_t count, uint8_t* to,
+               ptrdiff_t stride);
+// The same of words that lie side by side, in pairs or in fours.
+void put_pairs(const uint16_t* const samples[2], SampleBits bits, size_t count, uint8_t* to);
+void put_fours(const uint16_t* const samples[4], SampleBits bits, size_t count, uint8_t* to);
+
+// What core/passes/chroma.h and soft_edge.h have for bytes.
+
+// out[k] = the mean of those of above[2 k], above[2 k + 1], below[2 k] and below[2 k + 1] that
+// there are, halves rounded up, for k < (count + 1) / 2. count: of a row. below: may be null.
+void mean_of_pairs(const uint16_t* above, const uint16_t* below, size_t count, uint16_t* out);
+// out[p] = black + (white - black) x[p] / 255, rounded.
+void fit_levels(const uint8_t* x, uint16_t black, uint16_t white, size_t count, uint16_t* out);
+// out[p] = min(black + |x[p] - l[p]|, white).
+void residual_levels(const uint16_t* x, const uint16_t* l, uint16_t black, uint16_t white,
+                     size_t count, uint16_t* out);
+// out[p] = black where alpha[p] is 0, x[p] where it is 255, and what is in between, rounded.
+void fade(const uint16_t* x, const uint8_t* alpha, uint16_t black, size_t count, uint16_t* out);
+
+}  // namespace qdmd

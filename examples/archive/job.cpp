@@ -1,0 +1,369 @@
+#include "examples/archive/job.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "examples/archive/files.h"
+#include "examples/archive/frame_reader.h"
+#include "examples/archive/progress_line.h"
+
+namespace qdmd::archive {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kSamples = 3;  // R, G, B of pictures that are gathered
+
+// What the files depend on, but not how many processes write them.
+std::string settings_of(const JobOptions& options) {
+  std::ostringstream text;
+  text.precision(17);
+  const EngineOptions& engine = options.engine;
+  text << "method " << static_cast<int>(engine.method) << " window " << engine.window_size
+       << " rank " << engine.dmd.rank << " omega-threshold " << engine.dmd.omega_threshold
+       << " amplitude " << static_cast<int>(engine.dmd.amplitude) << " solver "
+       << static_cast<int>(engine.dmd.solver) << " estimator "
+       << static_cast<int>(engine.dmd.estimator) << " sample-step " << engine.sample_step
+       << " iterations " << engine.iterations << " foreground-threshold "
+       << engine.foreground_threshold << " shadows " << static_cast<int>(options.shadows)
+       << " absorb-time " << options.absorb_time << " rate " << options.rate << " encoder "
+       << options.encoder;
+  for (const std::string& path : options.recordings) text << " from " << fs::absolute(path);
+  for (const Wanted& wanted : options.wanted)
+    text << " to " << static_cast<int>(wanted.output) << " " << fs::absolute(wanted.path);
+  return text.str();
+}
+
+class Job {
+ public:
+  Job(const JobOptions& options, MpiTeam* team)
+      : options_(options),
+        team_(team),
+        reader_(options.recordings, options.rate,
+                [this](const RecordingInfo& info) { return choose(info); }),
+        line_(options.quiet || !writes()) {
+    progress_path_ = options.wanted.front().path + ".progress";
+    engine_options_ = options.engine;
+    engine_options_.team = team;
+    engine_options_.remembers = false;
+    done_.settings = settings_of(options);
+    if (options.resume) go_on();
+  }
+
+  void run() {
+    // Nobody reads what the first process is about to write.
+    if (team_) team_->wait_for_all();
+    if (!done_.ended) read_all();
+    if (writes()) finish();
+    if (team_) team_->wait_for_all();
+    report();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
+  // Where an earlier job stopped. The first process has its files.
+  void go_on() {
+    if (writes()) {
+      const auto before = read_progress(progress_path_);
+      if (before && before->settings != done_.settings)
+        throw std::runtime_error(progress_path_ +
+                                 " is of a job with other options: give the same ones, or leave "
+                                 "--resume out to begin anew");
+      if (before) done_ = *before;
+    }
+    if (!team_) return;
+    int64_t values[] = {done_.windows, done_.frames, done_.ended};
+    team_->tell(values);
+    done_.windows = values[0];
+    done_.frames = values[1];
+    done_.ended = values[2] != 0;
+  }
+
+  bool writes() const { return !team_ || team_->rank() == 0; }
+  int64_t window_size() const { return engine_options_.window_size; }
+
+  // From the streaming thread, before there is a frame.
+  Rows choose(const RecordingInfo& info) {
+    const Status status = check_options(engine_options_, info.width, info.height);
+    if (!status.ok()) throw std::invalid_argument(status.message);
+    const Band band = band_of(engine_options_, info.width, info.height);
+    return {band.first(), band.rows()};
+  }
+
+  bool next_frame() {
+    const auto start = Clock::now();
+    const bool some = reader_.next();
+    reading_ += since(start);
+    return team_ ? team_->all_have(some) : some;
+  }
+
+  void configure() {
+    const RecordingInfo& info = reader_.info();
+    if (team_) {
+      int64_t first[] = {info.width, info.height};
+      team_->tell(first);
+      if (team_->agree(first[0] != info.width || first[1] != info.height) != 0)
+        throw std::runtime_error("processes read frames of different sizes, this one of " +
+                                 std::to_string(info.width) + "x" + std::to_string(info.height) +
+                                 ": do all machines have the same files?");
+    }
+    engine_options_.frame_rate = 0;
+    const Status status = engine_.configure(engine_options_, info.width, info.height);
+    if (!status.ok()) throw std::invalid_argument(status.message);
+    if (options_.absorb_time > 0)
+      engine_.set_absorb_frames(static_cast<int64_t>(
+          std::clamp(std::round(options_.absorb_time * info.rate), 1.0, 1e12)));
+    engine_.set_shadows(options_.shadows);
+    engine_.set_masks_expected(wants_masks());
+    const Band& band = engine_.band();
+    const auto row = static_cast<size_t>(info.width);
+    kept_.resize(kSamples * row * static_cast<size_t>(band.rows()));
+    if (writes()) whole_.resize(kSamples * row * static_cast<size_t>(info.height));
+    // A byte a pixel.
+    for (int rank = 0; rank < band.members(); ++rank)
+      ends_.push_back(row * static_cast<size_t>(band.end_of(rank)));
+    outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
+    if (writes()) outputs_->begin_after(done_.windows);
+  }
+
+  bool wants_masks() const {
+    return std::any_of(options_.wanted.begin(), options_.wanted.end(), [](const Wanted& one) {
+      return one.output == Output::mask || one.output == Output::cutout;
+    });
+  }
+
+  void read_all() {
+    // If the recording ends early in a window, that window has frames of the one before it.
+    const int64_t first = std::max<int64_t>(0, done_.frames - window_size());
+    int64_t read = 0;
+    std::vector<GstClockTime> times;
+    while (next_frame()) {
+      if (++read <= first) continue;
+      if (!engine_.configured()) {
+        configure();
+        line_.begin(reader_.share());
+      }
+      const auto start = Clock::now();
+      check(engine_.push(reader_.view()));
+      pushing_ += since(start);
+      times.push_back(reader_.time());
+      line_.show(reader_.share(), read, done_.windows + 1);
+      if (static_cast<int64_t>(times.size()) == window_size()) end_window(&times, read);
+    }
+    if (read == 0) throw std::runtime_error("the recording has no frame");
+    if (!times.empty()) end_window(&times, read);
+    frames_ = read - std::min(first, read);
+    done_.ended = true;
+    if (read < done_.frames)
+      throw std::runtime_error("the recording has fewer frames than were finished already");
+    if (writes()) write_progress(progress_path_, done_);
+  }
+
+  void check(const Status& status) const {
+    if (!status.ok()) throw std::runtime_error(status.message);
+  }
+
+  // Writes what a window gives, unless that was done before.
+  void end_window(std::vector<GstClockTime>* times, int64_t read) {
+    const auto start = Clock::now();
+    check(engine_.drain());
+    solving_ += since(start);
+    const bool known = read <= done_.frames;
+    for (GstClockTime time : *times) {
+      if (!known) write_frame(time);
+      engine_.skip();
+    }
+    if (!known) {
+      write_background();
+      ++done_.windows;
+      done_.frames = read;
+      const auto end = Clock::now();
+      if (writes()) {
+        outputs_->end_window(done_.windows - 1);
+        write_progress(progress_path_, done_);
+      }
+      encoding_ += since(end);
+      note_solve();
+    }
+    engine_.begin_anew();
+    times->clear();
+  }
+
+  void note_solve() {
+    const SolveReport report = engine_.report();
+    solves_.push_back({{"frames", report.window_frames},
+                       {"rank", report.dmd.rank},
+                       {"lambda", {report.dmd.lambda.real(), report.dmd.lambda.imag()}},
+                       {"omega", report.dmd.omega},
+                       {"noise", report.foreground.noise},
+                       {"foreground-ratio", report.foreground.ratio}});
+  }
+
+  void write_frame(GstClockTime time) {
+    for (size_t which = 0; which < options_.wanted.size(); ++which) {
+      const Wanted& wanted = options_.wanted[which];
+      if (wanted.is_picture()) continue;
+      if (wanted.output == Output::mask && options_.shadows != Shadows::marked) {
+        const auto start = Clock::now();
+        const uint8_t* const mask = engine_.whole_mask();
+        pictures_ += since(start);
+        if (writes()) encode(which, {mask, ends_.back()}, time);
+        continue;
+      }
+      const bool grey = wanted.output == Output::mask;
+      const auto start = Clock::now();
+      engine_.write(wanted.output, {}, kept_view(grey));
+      pictures_ += since(start);
+      const std::span<const uint8_t> picture = gather(grey);
+      if (writes()) encode(which, picture, time);
+    }
+  }
+
+  void encode(size_t which, std::span<const uint8_t> picture, GstClockTime time) {
+    const auto start = Clock::now();
+    outputs_->write(which, done_.windows, picture, time);
+    encoding_ += since(start);
+  }
+
+  void write_background() {
+    for (size_t which = 0; which < options_.wanted.size(); ++which) {
+      if (!options_.wanted[which].is_picture()) continue;
+      engine_.write_background(kept_view(false));
+      const std::span<const uint8_t> picture = gather(false);
+      if (writes()) outputs_->write_picture(which, done_.windows, picture);
+    }
+  }
+
+  MutableImageView kept_view(bool grey) {
+    MutableImageView view;
+    for (int c = 0; c < kChannels; ++c) view.channel[c] = kept_.data() + (grey ? 0 : c);
+    view.width = reader_.info().width;
+    view.height = engine_.band().rows();
+    view.pixel_stride = grey ? 1 : static_cast<ptrdiff_t>(kSamples);
+    view.row_stride = view.pixel_stride * view.width;
+    return view;
+  }
+
+  // The whole picture of which each process has written its own rows; the first process has it.
+  std::span<const uint8_t> gather(bool grey) {
+    const Band& band = engine_.band();
+    const size_t row = (grey ? 1 : kSamples) * static_cast<size_t>(reader_.info().width);
+    const std::span own = std::span(kept_).subspan(row * static_cast<size_t>(band.own_begin()),
+                                                   row * static_cast<size_t>(band.own_rows()));
+    if (!team_) return own;
+    std::vector<size_t> ends = ends_;
+    for (size_t& end : ends) end *= grey ? 1 : kSamples;
+    team_->gather(own, whole_, ends);
+    return std::span(whole_).first(writes() ? ends.back() : 0);
+  }
+
+  // The first process only.
+  void finish() {
+    const auto start = Clock::now();
+    line_.say("joining the windows' videos");
+    if (!outputs_) {
+      const RecordingInfo info;
+      outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
+    }
+    outputs_->join(done_.windows);
+    // Whoever is killed from here on has all files, and may join them once more.
+    outputs_->remove_parts();
+    fs::remove(progress_path_);
+    encoding_ += since(start);
+    line_.end();
+  }
+
+  // Of all processes, by the first.
+  std::vector<double> of_all(double value) const {
+    return team_ ? team_->collect(value) : std::vector<double>{value};
+  }
+
+  void report() {
+    if (options_.report.empty()) return;
+    rusage usage = {};
+    getrusage(RUSAGE_SELF, &usage);
+    Json processes;
+    const auto add = [&](const char* name, double value) {
+      const std::vector<double> values = of_all(value);
+      if (writes()) processes[name] = values;
+    };
+    const double all = since(begin_);
+    add("seconds", all);
+    add("seconds-reading", reading_);
+    add("seconds-taking", pushing_);
+    add("seconds-solving", solving_);
+    add("seconds-pictures", pictures_);
+    add("seconds-encoding", encoding_);
+    add("seconds-talking", team_ ? team_->seconds() : 0);
+    const auto in_seconds = [](const timeval& time) {
+      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
+    // Of all threads, but for what is spent on waiting for others.
+    add("processor-seconds", in_seconds(usage.ru_utime) + in_seconds(usage.ru_stime) -
+                                 (team_ ? team_->processor_seconds() : 0));
+    add("most-memory", static_cast<double>(usage.ru_maxrss) * 1024);
+    add("rows", engine_.configured() ? engine_.band().own_rows() : 0);
+    add("rows-kept", engine_.configured() ? engine_.band().rows() : 0);
+    const auto frames = static_cast<double>(std::max<int64_t>(frames_, 1));
+    Json bytes;
+    for (size_t i = 0; team_ && i < kTraffic; ++i) {
+      const auto traffic = static_cast<Traffic>(i);
+      const std::vector<double> values =
+          team_->collect(static_cast<double>(team_->received(traffic)) / frames);
+      if (writes()) bytes[name_of(traffic)] = values;
+    }
+    if (!writes()) return;
+    const RecordingInfo& info = reader_.info();
+    const Json json = {{"size", {info.width, info.height}},
+                       {"frames", frames_},
+                       {"windows", done_.windows},
+                       {"processes", team_ ? team_->size() : 1},
+                       {"of-process", processes},
+                       {"bytes-received-a-frame", bytes},
+                       {"solves", solves_}};
+    std::FILE* const file =
+        options_.report == "-" ? stdout : std::fopen(options_.report.c_str(), "w");
+    if (!file) throw std::runtime_error(options_.report + " cannot be written");
+    std::fprintf(file, "%s\n", json.dump(1).c_str());
+    if (file != stdout) std::fclose(file);
+  }
+
+  const JobOptions& options_;
+  MpiTeam* team_;
+  EngineOptions engine_options_;
+  Clock::time_point begin_ = Clock::now();
+  FrameReader reader_;
+  ProgressLine line_;
+  Engine engine_;
+  std::optional<Outputs> outputs_;
+  std::string progress_path_;
+  Progress done_;
+  int64_t frames_ = 0;
+  std::vector<uint8_t> kept_, whole_;
+  std::vector<size_t> ends_;
+  Json solves_ = Json::array();
+  double reading_ = 0, pushing_ = 0, solving_ = 0, pictures_ = 0, encoding_ = 0;
+};
+
+}  // namespace
+
+void run_job(const JobOptions& options, MpiTeam* team) {
+  check_wanted(options.wanted);
+  Job(options, team).run();
+}
+
+}  // namespace qdmd::archive

@@ -1,0 +1,144 @@
+#include "examples/archive/outputs.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+
+#include "examples/archive/files.h"
+
+namespace qdmd::archive {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string folder_of(const std::string& path) { return path + ".parts"; }
+
+std::string picture_of(const std::string& path, int64_t window) {
+  if (window == 0) return path;
+  const fs::path whole(path);
+  return (whole.parent_path() /
+          (whole.stem().string() + "-" + std::to_string(window + 1) + whole.extension().string()))
+      .string();
+}
+
+const char* option_of(Output output) {
+  switch (output) {
+    case Output::background:
+      return "--background";
+    case Output::foreground:
+      return "--foreground";
+    case Output::mask:
+      return "--mask";
+    case Output::cutout:
+      break;
+  }
+  return "--cutout";
+}
+
+}  // namespace
+
+bool Wanted::is_picture() const { return fs::path(path).extension() == ".png"; }
+
+void check_wanted(const std::vector<Wanted>& wanted) {
+  if (wanted.empty())
+    throw std::invalid_argument(
+        "nothing is to be written: give --background, --mask, --foreground or --cutout");
+  for (const Wanted& one : wanted) {
+    const fs::path path(one.path);
+    if (one.is_picture() && one.output != Output::background)
+      throw std::invalid_argument(std::string(option_of(one.output)) +
+                                  " is a video: give it a name that ends in .mkv");
+    if (!one.is_picture() && path.extension() != ".mkv")
+      throw std::invalid_argument(one.path +
+                                  " ends in neither .mkv (a video) nor .png (a picture)");
+    for (const Wanted& other : wanted)
+      if (&other != &one && fs::absolute(other.path) == fs::absolute(path))
+        throw std::invalid_argument(one.path + " is named twice");
+  }
+}
+
+Outputs::Outputs(std::vector<Wanted> wanted, int width, int height, double rate,
+                 std::string encoder)
+    : wanted_(std::move(wanted)),
+      width_(width),
+      height_(height),
+      rate_(rate),
+      encoder_(std::move(encoder)) {}
+
+std::string Outputs::part_of(size_t which, int64_t window) const {
+  char name[32];
+  std::snprintf(name, sizeof name, "%08lld.mkv", static_cast<long long>(window + 1));
+  return (fs::path(folder_of(wanted_[which].path)) / name).string();
+}
+
+VideoShape Outputs::shape_of(size_t which) const {
+  return {width_, height_, rate_, wanted_[which].output == Output::mask};
+}
+
+void Outputs::begin_after(int64_t windows) {
+  for (size_t which = 0; which < wanted_.size(); ++which) {
+    const fs::path beside = fs::absolute(wanted_[which].path).parent_path();
+    if (!fs::is_directory(beside))
+      throw std::runtime_error(beside.string() + " is no folder: make it first");
+    if (wanted_[which].is_picture()) {
+      fs::remove(temporary_of(picture_of(wanted_[which].path, windows)));
+      continue;
+    }
+    const fs::path folder = folder_of(wanted_[which].path);
+    fs::create_directories(folder);
+    std::vector<fs::path> known;
+    for (int64_t window = 0; window < windows; ++window) known.push_back(part_of(which, window));
+    std::vector<fs::path> unknown;
+    for (const auto& entry : fs::directory_iterator(folder))
+      if (std::find(known.begin(), known.end(), entry.path()) == known.end())
+        unknown.push_back(entry.path());
+    for (const fs::path& path : unknown) fs::remove(path);
+    for (const fs::path& path : known)
+      if (!fs::exists(path))
+        throw std::runtime_error(path.string() + " is gone: begin anew, without --resume");
+  }
+}
+
+void Outputs::write(size_t which, int64_t window, std::span<const uint8_t> frame,
+                    GstClockTime time) {
+  std::unique_ptr<VideoWriter>& writer = writers_[which];
+  if (!writer)
+    writer = std::make_unique<VideoWriter>(temporary_of(part_of(which, window)), shape_of(which),
+                                           encoder_);
+  writer->write(frame, time);
+}
+
+void Outputs::write_picture(size_t which, int64_t window, std::span<const uint8_t> frame) {
+  const std::string path = picture_of(wanted_[which].path, window);
+  VideoWriter writer(temporary_of(path), shape_of(which), kPicture);
+  writer.write(frame, 0);
+  writer.end();
+  give_name(path);
+}
+
+void Outputs::end_window(int64_t window) {
+  for (auto& [which, writer] : writers_) {
+    writer->end();
+    writer.reset();
+    give_name(part_of(which, window));
+  }
+  writers_.clear();
+}
+
+void Outputs::join(int64_t windows) {
+  for (size_t which = 0; which < wanted_.size(); ++which) {
+    if (wanted_[which].is_picture()) continue;
+    std::vector<std::string> parts;
+    for (int64_t window = 0; window < windows; ++window) parts.push_back(part_of(which, window));
+    join_videos(parts, temporary_of(wanted_[which].path));
+    give_name(wanted_[which].path);
+  }
+}
+
+void Outputs::remove_parts() {
+  for (const Wanted& one : wanted_)
+    if (!one.is_picture()) fs::remove_all(folder_of(one.path));
+}
+
+}  // namespace qdmd::archive

@@ -1,0 +1,57 @@
+// The files of a job, which one process writes: whole windows or nothing.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/foreground/foreground.h"
+#include "examples/archive/video_writer.h"
+
+namespace qdmd::archive {
+
+// What is wanted, by the file's name: videos end in .mkv, pictures of backgrounds in .png.
+struct Wanted {
+  Output output = Output::background;
+  std::string path;
+
+  bool is_picture() const;
+};
+
+// Throws std::invalid_argument with a sentence for the user.
+void check_wanted(const std::vector<Wanted>& wanted);
+
+// A video has a file for each window in a folder beside it, and is joined of these at the end: a
+// video that is written to as one cannot be gone on with. A picture of a window's background has
+// its name at once: that of the first window as it was given, others with their number.
+class Outputs {
+ public:
+  Outputs(std::vector<Wanted> wanted, int width, int height, double rate, std::string encoder);
+
+  // What earlier jobs left, from window `windows` on, is removed.
+  void begin_after(int64_t windows);
+  // One frame of video `which` of the wanted ones, in window `window`, the first being 0.
+  void write(size_t which, int64_t window, std::span<const uint8_t> frame, GstClockTime time);
+  // The background of a window.
+  void write_picture(size_t which, int64_t window, std::span<const uint8_t> frame);
+  // The window's files have their names.
+  void end_window(int64_t window);
+  // Videos of so many windows become one each.
+  void join(int64_t windows);
+  // What was only there to be joined.
+  void remove_parts();
+
+ private:
+  std::string part_of(size_t which, int64_t window) const;
+  VideoShape shape_of(size_t which) const;
+
+  std::vector<Wanted> wanted_;
+  int width_, height_;
+  double rate_;
+  std::string encoder_;
+  std::map<size_t, std::unique_ptr<VideoWriter>> writers_;
+};
+
+}  // namespace qdmd::archive

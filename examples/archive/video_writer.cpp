@@ -1,0 +1,128 @@
+#include "examples/archive/video_writer.h"
+
+#include <gst/app/gstappsink.h>
+#include <gst/app/gstappsrc.h>
+#include <gst/video/video.h>
+
+#include <cmath>
+#include <cstring>
+
+namespace qdmd::archive {
+namespace {
+
+constexpr const char* kSource = "appsrc name=source format=time max-bytes=0 max-buffers=0 ! ";
+// Frames that wait to be encoded before the writer does.
+constexpr guint64 kMostWaiting = 4;
+
+void finish(const PipelinePtr& pipeline, const std::string& what) {
+  while (!has_ended(pipeline, GST_SECOND, what)) {
+  }
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+void play(const PipelinePtr& pipeline, const std::string& what) {
+  if (gst_element_set_state(pipeline.get(), GST_STATE_PLAYING) != GST_STATE_CHANGE_FAILURE) return;
+  has_ended(pipeline, GST_SECOND, what);
+  throw std::runtime_error(what);
+}
+
+void push(const PipelinePtr& pipeline, const ElementPtr& source, GstBuffer* buffer,
+          const std::string& what) {
+  // An appsrc that waits by itself does not see that the pipeline has failed.
+  while (gst_app_src_get_current_level_buffers(GST_APP_SRC(source.get())) >= kMostWaiting)
+    has_ended(pipeline, 2 * GST_MSECOND, what);
+  if (gst_app_src_push_buffer(GST_APP_SRC(source.get()), buffer) == GST_FLOW_OK) return;
+  has_ended(pipeline, GST_SECOND, what);
+  throw std::runtime_error(what);
+}
+
+}  // namespace
+
+// Slices would be threads' work: a process has one core.
+const char* const kLossless = "avenc_ffv1 ! matroskamux";
+const char* const kPicture = "pngenc snapshot=true";
+
+VideoWriter::VideoWriter(const std::string& path, const VideoShape& shape,
+                         const std::string& encoder)
+    : path_(path), shape_(shape) {
+  // Of all that the lossless encoder takes, what loses nothing of this.
+  const std::string kept =
+      shape.grey ? "video/x-raw,format=GRAY8 ! " : "video/x-raw,format=BGRx ! ";
+  pipeline_ =
+      make_pipeline(std::string(kSource) + "videoconvert ! " + (encoder == kLossless ? kept : "") +
+                    encoder + " ! filesink name=sink async=false");
+  source_ = element_of(pipeline_, "source");
+  g_object_set(element_of(pipeline_, "sink").get(), "location", path.c_str(), nullptr);
+  GstVideoInfo info;
+  gst_video_info_set_format(&info, shape.grey ? GST_VIDEO_FORMAT_GRAY8 : GST_VIDEO_FORMAT_RGB,
+                            static_cast<guint>(shape.width), static_cast<guint>(shape.height));
+  gst_util_double_to_fraction(shape.rate, &GST_VIDEO_INFO_FPS_N(&info),
+                              &GST_VIDEO_INFO_FPS_D(&info));
+  stride_ = static_cast<size_t>(GST_VIDEO_INFO_PLANE_STRIDE(&info, 0));
+  const CapsPtr caps(gst_video_info_to_caps(&info));
+  gst_app_src_set_caps(GST_APP_SRC(source_.get()), caps.get());
+  play(pipeline_, path + " cannot be written");
+}
+
+void VideoWriter::write(std::span<const uint8_t> frame, GstClockTime time) {
+  const auto rows = static_cast<size_t>(shape_.height);
+  const size_t row = frame.size() / rows;
+  GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, stride_ * rows, nullptr);
+  GstMapInfo map;
+  if (!buffer || !gst_buffer_map(buffer, &map, GST_MAP_WRITE))
+    throw std::runtime_error(path_ + ": there is no memory for a frame");
+  for (size_t y = 0; y < rows; ++y) {
+    std::memcpy(map.data + y * stride_, frame.data() + y * row, row);
+    std::memset(map.data + y * stride_ + row, 0, stride_ - row);
+  }
+  gst_buffer_unmap(buffer, &map);
+  GST_BUFFER_PTS(buffer) = time;
+  GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(std::llround(GST_SECOND / shape_.rate));
+  push(pipeline_, source_, buffer, path_ + " cannot be written");
+}
+
+void VideoWriter::end() {
+  gst_app_src_end_of_stream(GST_APP_SRC(source_.get()));
+  finish(pipeline_, path_ + " cannot be written");
+}
+
+void join_videos(const std::vector<std::string>& parts, const std::string& path) {
+  const std::string what = path + " cannot be written";
+  const PipelinePtr joined =
+      make_pipeline(std::string(kSource) + "matroskamux ! filesink name=sink async=false");
+  const ElementPtr source = element_of(joined, "source");
+  g_object_set(element_of(joined, "sink").get(), "location", path.c_str(), nullptr);
+  bool playing = false;
+  for (const std::string& part : parts) {
+    const std::string broken = part + " cannot be read";
+    const PipelinePtr reader = make_pipeline(
+        "filesrc name=file ! matroskademux ! appsink name=sink sync=false "
+        "max-buffers=4");
+    g_object_set(element_of(reader, "file").get(), "location", part.c_str(), nullptr);
+    play(reader, broken);
+    const ElementPtr sink = element_of(reader, "sink");
+    for (;;) {
+      const SamplePtr sample(
+          gst_app_sink_try_pull_sample(GST_APP_SINK(sink.get()), 100 * GST_MSECOND));
+      if (!sample) {
+        has_ended(reader, 0, broken);
+        if (gst_app_sink_is_eos(GST_APP_SINK(sink.get()))) break;
+        continue;
+      }
+      if (!playing) {
+        const CapsPtr caps(gst_caps_copy(gst_sample_get_caps(sample.get())));
+        // The demuxer leaves out what the muxer asks for.
+        if (gst_structure_has_name(gst_caps_get_structure(caps.get(), 0), "video/x-ffv"))
+          gst_caps_set_simple(caps.get(), "ffversion", G_TYPE_INT, 1, nullptr);
+        gst_app_src_set_caps(GST_APP_SRC(source.get()), caps.get());
+        play(joined, what);
+        playing = true;
+      }
+      push(joined, source, gst_buffer_ref(gst_sample_get_buffer(sample.get())), what);
+    }
+  }
+  gst_app_src_end_of_stream(GST_APP_SRC(source.get()));
+  finish(joined, what);
+}
+
+}  // namespace qdmd::archive

@@ -1,0 +1,384 @@
+"""Runs qdmd-archive with mpirun: whatever the number of processes, and however often it is killed,
+what it writes is what one process writes, and what the element gives of the same window.
+
+Usage: archive_test.py ARCHIVE MPIRUN [WORD...]     WORD: only cases with one of them in the name
+       QDMD_ARCHIVE_LONG=1: more kills and numbers of processes
+"""
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / 'examples'))
+import common
+from common import Gst
+
+import gi
+
+gi.require_version('GstApp', '1.0')
+gi.require_version('GstVideo', '1.0')
+from gi.repository import GstApp, GstVideo  # noqa: F401  (methods of appsrc and appsink)
+
+archive, mpirun = (str(pathlib.Path(argument).resolve()) for argument in sys.argv[1:3])
+LONG = bool(os.environ.get('QDMD_ARCHIVE_LONG'))
+# One machine only: no launcher and no network.
+JOB = ['--oversubscribe', '--allow-run-as-root', '--bind-to', 'none', '--mca', 'plm', 'isolated',
+       '--mca', 'btl', 'self,vader', '--mca', 'oob_tcp_if_include', 'lo', '--mca',
+       'btl_vader_single_copy_mechanism', 'none', '--mca', 'mpi_yield_when_idle', '1']
+WIDTH, HEIGHT, FRAMES, WINDOW = 161, 123, 50, 20
+LONG_FRAMES = 97
+
+
+def command(processes, *words):
+    words = [str(word) for word in words]
+    if processes == 0:  # by itself, without mpirun
+        return [archive, *words]
+    return [mpirun, '-q', '-n', str(processes), *JOB, archive, *words]
+
+
+def run(folder, processes, *words, expect=0):
+    done = subprocess.run(command(processes, *words), cwd=folder, capture_output=True, text=True,
+                          timeout=240)
+    text = done.stdout + done.stderr
+    if expect == 0:
+        assert done.returncode == 0, f'exit status {done.returncode}\n{text}'
+    else:
+        assert done.returncode != 0, f'it ended well\n{text}'
+    return text
+
+
+def frames_of(description, pixel_format='RGB'):
+    """The frames that a pipeline gives: (time in ms, bytes without what pads rows)."""
+    pipeline = Gst.parse_launch(f'{description} ! videoconvert ! '
+                                f'video/x-raw,format={pixel_format} ! '
+                                'appsink name=end sync=false')
+    pipeline.set_state(Gst.State.PLAYING)
+    end, frames = pipeline.get_by_name('end'), []
+    while sample := end.try_pull_sample(30 * Gst.SECOND):
+        buffer = sample.get_buffer()
+        info = GstVideo.VideoInfo.new_from_caps(sample.get_caps())
+        row = info.width * info.finfo.pixel_stride[0]
+        data = buffer.extract_dup(0, buffer.get_size())
+        rows = b''.join(data[y * info.stride[0]:y * info.stride[0] + row]
+                        for y in range(info.height))
+        frames.append((round(buffer.pts / 1e6), rows))
+    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+    pipeline.set_state(Gst.State.NULL)
+    if message:
+        raise RuntimeError(f'{description}: {message.parse_error()[0].message}')
+    return frames
+
+
+def video(path, pixel_format='RGB'):
+    return frames_of(f'filesrc location="{path}" ! decodebin', pixel_format)
+
+
+def make_clip(path, frames=FRAMES, width=WIDTH, height=HEIGHT, pixels='I420', seed=3):
+    common.play(f'qdmdscenesrc scene=basic,noise=2,trees seed={seed} num-buffers={frames} ! '
+                f'video/x-raw,width={width},height={height},framerate=25/1 ! videoconvert ! '
+                f'video/x-raw,format={pixels} ! avenc_ffv1 ! matroskamux ! '
+                f'filesink location="{path}"').set_state(Gst.State.NULL)
+
+
+def outputs(folder, name):
+    return ['--background', folder / f'{name}.png', '--mask', folder / f'{name}-mask.mkv',
+            '--foreground', folder / f'{name}-foreground.mkv']
+
+
+def results(folder, name):
+    """All that a job has written."""
+    pictures = {path.name[len(name):]: video(path)[0][1]
+                for path in sorted(folder.glob(f'{name}*.png'))}
+    return (pictures, video(folder / f'{name}-mask.mkv', 'GRAY8'),
+            video(folder / f'{name}-foreground.mkv'))
+
+
+def leftovers(folder, name):
+    return [path.name for path in folder.glob(f'{name}*')
+            if path.suffix in ('.parts', '.tmp', '.progress')]
+
+
+def compare(one, other, what):
+    assert one[0].keys() == other[0].keys(), f'{what}: {one[0].keys()} and {other[0].keys()}'
+    for number in one[0]:
+        assert one[0][number] == other[0][number], f'{what}: another background {number}'
+    for kind, mine, theirs in (('mask', one[1], other[1]), ('foreground', one[2], other[2])):
+        assert [time for time, _ in mine] == [time for time, _ in theirs], f'{what}: {kind} times'
+        differ = [t for t, (a, b) in enumerate(zip(mine, theirs)) if a[1] != b[1]]
+        assert not differ, f'{what}: {kind} of frames {differ}'
+
+
+def any_number_of_processes(folder, method):
+    clip = folder / 'clip.mkv'
+    run(folder, 0, clip, *outputs(folder, f'{method}0'), '--window', WINDOW, '--method', method,
+        '--report', f'{method}0.json', '--quiet')
+    alone = results(folder, f'{method}0')
+    solves = json.loads((folder / f'{method}0.json').read_text())['solves']
+    assert len(solves) == 3 and len(alone[0]) == 3 and len(alone[1]) == FRAMES, solves
+    assert 0 < sum(mask.count(255) for _, mask in alone[1]), 'empty masks compare nothing'
+    for processes in (1, 2, 3, 4):
+        name = f'{method}{processes}'
+        run(folder, processes, clip, *outputs(folder, name), '--window', WINDOW, '--method',
+            method, '--report', f'{name}.json', '--quiet')
+        compare(alone, results(folder, name), name)
+        found = json.loads((folder / f'{name}.json').read_text())
+        assert found['solves'] == solves, f'{name}: {found["solves"]}, alone {solves}'
+        assert found['processes'] == processes and sum(found['of-process']['rows']) == HEIGHT
+        assert not leftovers(folder, name), leftovers(folder, name)
+    return alone, solves
+
+
+def element_of_window(clip, first, count, method, output):
+    """What the element sends of frames first .. first + count - 1, and its message."""
+    feed = frames_of(f'filesrc location="{clip}" ! decodebin', 'BGRx')[first:first + count]
+    pipeline = Gst.parse_launch(
+        f'appsrc name=source format=time caps=video/x-raw,format=BGRx,width={WIDTH},'
+        f'height={HEIGHT},framerate=25/1 ! qdmdbackground window-size={WINDOW} method={method} '
+        f'output={output} stabilize=off post-messages=true ! videoconvert ! '
+        f'video/x-raw,format=RGB ! appsink name=end sync=false')
+    pipeline.set_state(Gst.State.PLAYING)
+    source, end = pipeline.get_by_name('source'), pipeline.get_by_name('end')
+    for t, (_, frame) in enumerate(feed):
+        buffer = Gst.Buffer.new_wrapped(frame)
+        buffer.pts, buffer.duration = t * 40 * Gst.MSECOND, 40 * Gst.MSECOND
+        source.push_buffer(buffer)
+    source.end_of_stream()
+    frames = []
+    while sample := end.try_pull_sample(30 * Gst.SECOND):
+        data = sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
+        stride = len(data) // HEIGHT
+        frames.append(b''.join(data[y * stride:y * stride + 3 * WIDTH] for y in range(HEIGHT)))
+    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ELEMENT).get_structure()
+    pipeline.set_state(Gst.State.NULL)
+    return frames, message
+
+
+def as_the_element(folder, method, alone, solves):
+    for window in (0, 1, 2):
+        # The last window is not full: it has frames of the one before it.
+        first = min(WINDOW * window, FRAMES - WINDOW)
+        mine = slice(WINDOW * window, min(WINDOW * (window + 1), FRAMES))
+        shown = slice(mine.start - first, WINDOW)
+        clip = folder / 'clip.mkv'
+        backgrounds, message = element_of_window(clip, first, WINDOW, method, 'background')
+        number = f'-{window + 1}.png' if window else '.png'
+        assert alone[0][number] == backgrounds[-1], f'{method}: background of window {window}'
+        eigenvalue = [message.get_double(f'lambda-{part}')[1] for part in ('real', 'imaginary')]
+        assert eigenvalue == solves[window]['lambda'], f'{eigenvalue}, {solves[window]}'
+        foregrounds, _ = element_of_window(clip, first, WINDOW, method, 'foreground')
+        assert foregrounds[shown] == [frame for _, frame in alone[2][mine]], \
+            f'{method}: foreground of window {window}'
+        # What masks learn from the frames before is not there in the last window.
+        if first == WINDOW * window:
+            masks, _ = element_of_window(clip, first, WINDOW, method, 'mask')
+            assert [mask[::3] for mask in masks[shown]] == [mask for _, mask in alone[1][mine]], \
+                f'{method}: masks of window {window}'
+
+
+def one_method(folder, method):
+    alone, solves = any_number_of_processes(folder, method)
+    as_the_element(folder, method, alone, solves)
+
+
+def files_and_pictures(folder):
+    """Two files, and the frames as PNG pictures, are the same recording as one file."""
+    make_clip(folder / 'first.mkv', 24, seed=5)
+    make_clip(folder / 'second.mkv', 9, seed=6)
+    pictures = folder / 'pictures'
+    pictures.mkdir()
+    frames = video(folder / 'first.mkv') + video(folder / 'second.mkv')
+    for number, (_, frame) in enumerate(frames):
+        pipeline = Gst.parse_launch(
+            f'appsrc name=source format=time caps=video/x-raw,format=RGB,width={WIDTH},'
+            f'height={HEIGHT},framerate=25/1 ! pngenc snapshot=true ! '
+            f'filesink location="{pictures}/{number:04}.png"')
+        stride = (3 * WIDTH + 3) // 4 * 4
+        rows = b''.join(frame[y * 3 * WIDTH:(y + 1) * 3 * WIDTH].ljust(stride, b'\0')
+                        for y in range(HEIGHT))
+        pipeline.set_state(Gst.State.PLAYING)
+        buffer = Gst.Buffer.new_wrapped(rows)
+        buffer.pts = 0
+        pipeline.get_by_name('source').push_buffer(buffer)
+        pipeline.get_by_name('source').end_of_stream()
+        pipeline.get_bus().timed_pop_filtered(30 * Gst.SECOND, Gst.MessageType.EOS)
+        pipeline.set_state(Gst.State.NULL)
+    options = ['--window', 15, '--method', 'qdmd', '--quiet']
+    run(folder, 2, folder / 'first.mkv', folder / 'second.mkv', *outputs(folder, 'files'), *options)
+    run(folder, 3, pictures, *outputs(folder, 'folder'), *options)
+    run(folder, 0, pictures, *outputs(folder, 'alone'), *options)
+    files = results(folder, 'files')
+    assert len(files[1]) == 33
+    compare(files, results(folder, 'folder'), 'a folder of pictures')
+    compare(files, results(folder, 'alone'), 'one process')
+
+
+def more_outputs(folder):
+    for processes in (0, 2):
+        run(folder, processes, folder / 'clip.mkv', '--background', folder / f'b{processes}.mkv',
+            '--cutout', folder / f'c{processes}.mkv', '--mask', folder / f'm{processes}.mkv',
+            '--shadows', 'marked', '--window', WINDOW, '--quiet')
+    for letter in 'bcm':
+        assert video(folder / f'{letter}0.mkv') == video(folder / f'{letter}2.mkv'), letter
+    assert len(video(folder / 'b0.mkv')) == FRAMES
+
+
+def descendants(process):
+    children, found = {}, []
+    for entry in pathlib.Path('/proc').iterdir():
+        try:
+            parent = int((entry / 'stat').read_text().rpartition(')')[2].split()[1])
+            children.setdefault(parent, []).append(int(entry.name))
+        except (ValueError, OSError):
+            pass
+    waiting = [process]
+    while waiting:
+        one = waiting.pop()
+        found.append(one)
+        waiting += children.get(one, [])
+    return found
+
+
+def whole_so_far(folder, name):
+    """What has its final name is whole."""
+    for path in folder.glob(f'{name}*.parts/*.mkv'):
+        assert len(video(path)) in (10, LONG_FRAMES % 10), f'{path} has {len(video(path))} frames'
+    for path in folder.glob(f'{name}*.mkv'):
+        if path.is_file():
+            assert len(video(path)) == LONG_FRAMES, path
+    for path in folder.glob(f'{name}*.png'):
+        assert len(video(path)) == 1, path
+
+
+def killed_and_resumed(folder):
+    clip = folder / 'long.mkv'
+    options = ['--window', 10, '--method', 'robust', '--quiet']
+    start = time.monotonic()
+    run(folder, 2, clip, *outputs(folder, 'undisturbed'), *options)
+    takes = time.monotonic() - start
+    undisturbed = results(folder, 'undisturbed')
+    assert len(undisturbed[1]) == LONG_FRAMES
+    chance = random.Random(27)
+    resumed = 0
+    for kill in range(10 if LONG else 4):
+        # Some kills come before the first window, and some after the last: a job begins anew then.
+        job = subprocess.Popen(command(chance.choice((1, 2, 3)), clip, *outputs(folder, 'killed'),
+                                       *options, '--resume'),
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+        time.sleep(chance.uniform(0.3, 0.8) * takes)
+        processes = descendants(job.pid)
+        # All at once, or one of the job's own processes, which ends the job.
+        for process in processes if kill % 2 == 0 else processes[-1:]:
+            try:
+                os.kill(process, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        job.wait(60)
+        progress = folder / 'killed.png.progress'
+        resumed += progress.exists() and json.loads(progress.read_text())['windows'] > 0
+        whole_so_far(folder, 'killed')
+    run(folder, 2, clip, *outputs(folder, 'killed'), *options, '--resume')
+    compare(undisturbed, results(folder, 'killed'), f'{resumed} times resumed')
+    assert not leftovers(folder, 'killed'), leftovers(folder, 'killed')
+    print(f'# {resumed} of the killed jobs had finished windows', flush=True)
+
+
+def resumed_with_other_options(folder):
+    clip = folder / 'long.mkv'
+    job = subprocess.Popen(command(1, clip, *outputs(folder, 'other'), '--window', 10, '--quiet'),
+                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+    progress = folder / 'other.png.progress'
+    while not progress.exists() and job.poll() is None:
+        time.sleep(0.01)
+    for process in descendants(job.pid):
+        os.kill(process, signal.SIGKILL)
+    job.wait(60)
+    text = run(folder, 1, clip, *outputs(folder, 'other'), '--window', 12, '--resume', expect=1)
+    assert 'other options' in text, text
+
+
+def memory_of_processes(folder):
+    width, height, frames = 1280, 721, 100
+    clip = folder / 'large.mkv'
+    make_clip(clip, frames, width, height)
+    window = 3 * width * height * frames
+    for method in ('qdmd', 'robust'):
+        for processes in (1, 2, 4) if LONG else (2,):
+            most = {}
+            for size in (2, frames):
+                run(folder, processes, clip, '--background', folder / 'm.png', '--window', size,
+                    '--method', method, '--report', folder / 'm.json', '--quiet')
+                most[size] = json.loads((folder / 'm.json').read_text())['of-process']['most-memory']
+            # Besides what decoding takes, and buffers of one frame.
+            shares = [(whole - bare) / window for whole, bare in zip(most[frames], most[2])]
+            print(f'# {method}, {processes} processes: '
+                  + ' '.join(f'{share:.3f}' for share in shares), flush=True)
+            assert max(shares) <= 1 / processes + 0.1, f'{method}, {processes}: {shares}'
+
+
+def failing_process(folder):
+    """One process's file is another: the job ends, and says why."""
+    def two(first, second):
+        words = [str(word) for word in (*outputs(folder, 'fails'), '--window', 10, '--quiet')]
+        done = subprocess.run([mpirun, '-q', *JOB, '-n', '1', archive, str(first), *words, ':',
+                               '-n', '1', archive, str(second), *words],
+                              cwd=folder, capture_output=True, text=True, timeout=60)
+        assert done.returncode != 0, f'it ended well: {done.stdout}{done.stderr}'
+        return done.stderr
+
+    clip = folder / 'long.mkv'
+    make_clip(folder / 'short.mkv', 13)
+    said = two(clip, folder / 'short.mkv')
+    assert 'do all machines have the same files' in said, said
+    (folder / 'broken.mkv').write_bytes(b'nothing of the kind' * 1000)
+    said = two(clip, folder / 'broken.mkv')
+    assert 'broken.mkv cannot be decoded' in said and 'process 1' in said, said
+    said = two(clip, folder / 'missing.mkv')
+    assert 'missing.mkv' in said, said
+
+
+def errors(folder):
+    clip = folder / 'clip.mkv'
+    for words, reason in (
+            ([clip], 'nothing is to be written'),
+            ([clip, '--mask', 'mask.png'], '.mkv'),
+            ([clip, '--mask', 'mask.avi'], '.mkv'),
+            ([clip, '--mask', 'one.mkv', '--foreground', 'one.mkv'], 'twice'),
+            ([clip, '--mask', 'no/folder/mask.mkv'], 'no/folder'),
+            ([clip, '--background', 'b.png', '--method', 'magic'], '--method'),
+            ([clip, '--background', 'b.png', '--window', 1], '--window'),
+            ([folder, '--background', 'b.png', '--window', 1], '--window'),
+            ([folder / 'none.mkv', '--background', 'b.png'], 'none.mkv')):
+        for processes in (0, 2):
+            text = run(folder, processes, *words, expect=2)
+            assert reason in text, f'{words}: {text}'
+    common.play('videotestsrc num-buffers=5 ! video/x-raw,format=BGRx,width=64,height=3 ! '
+                f'avenc_ffv1 ! matroskamux ! filesink location="{folder}/low.mkv"'
+                ).set_state(Gst.State.NULL)
+    text = run(folder, 4, folder / 'low.mkv', '--background', 'b.png', expect=1)
+    assert 'start fewer' in text, text
+    assert '--window' in run(folder, 0, '--help')
+
+
+def main():
+    cases = [(f'{method} of any number of processes, and of the element', one_method, method)
+             for method in ('qdmd', 'dmd', 'robust')]
+    cases += [(check.__name__.replace('_', ' '), check)
+              for check in (files_and_pictures, more_outputs, killed_and_resumed,
+                            resumed_with_other_options, memory_of_processes, failing_process,
+                            errors)]
+    words = sys.argv[3:]
+    cases = [case for case in cases if not words or any(word in case[0] for word in words)]
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        make_clip(folder / 'clip.mkv')
+        make_clip(folder / 'long.mkv', LONG_FRAMES, 321, 243)
+        return common.report([(case, lambda check=check, words=words: check(folder, *words))
+                              for case, check, *words in cases])
+
+
+sys.exit(main())

@@ -1,0 +1,120 @@
+// Fuzz target: a saved background's bytes are read whole, or refused with a sentence.
+#include <algorithm>
+#include <vector>
+
+#include "core/engine/engine.h"
+#include "core/model/learnt_file.h"
+#include "tests/fuzz/bytes.h"
+#include "tests/fuzz/expect.h"
+
+namespace {
+
+using namespace qdmd;
+using Bytes = std::vector<uint8_t>;
+
+void put(Bytes* file, size_t at, uint64_t value, size_t bytes) {
+  for (size_t i = 0; i < bytes && at + i < file->size(); ++i)
+    (*file)[at + i] = static_cast<uint8_t>(value >> (8 * i));
+}
+
+// As the file's last eight bytes have it: what a fuzzer would never guess.
+void put_checksum(Bytes* file) {
+  if (file->size() < 8) return;
+  uint64_t hash = 0xcbf29ce484222325;
+  for (size_t i = 0; i + 8 < file->size(); ++i) hash = (hash ^ (*file)[i]) * 0x100000001b3;
+  put(file, file->size() - 8, hash, 8);
+}
+
+Learnt any_learnt(fuzz::Bytes* bytes) {
+  Learnt learnt;
+  learnt.width = bytes->from(1, 6);
+  learnt.height = bytes->from(1, 6);
+  const auto pixels = static_cast<size_t>(learnt.width * learnt.height);
+  const auto plane = [&] {
+    std::vector<uint8_t> samples(pixels);
+    for (uint8_t& sample : samples) sample = bytes->byte();
+    return samples;
+  };
+  for (auto& level : learnt.level) level = plane();
+  if (bytes->once_in(2)) learnt.limits = plane();
+  if (bytes->once_in(2)) {
+    auto& earlier = learnt.earlier.emplace();
+    for (auto& level : earlier.level) level = plane();
+    earlier.spread = plane();
+    earlier.rows = bytes->from(1, learnt.height);
+    earlier.cols = bytes->from(1, learnt.width);
+    for (auto* numbers : {&earlier.weight, &earlier.limit})
+      numbers->assign(static_cast<size_t>(earlier.rows * earlier.cols),
+                      static_cast<float>(bytes->byte()));
+  }
+  return learnt;
+}
+
+// What was read suits an engine of its size, or is refused by it, and is written as it was read.
+void use(const Learnt& learnt, const Bytes& file) {
+  QDMD_DEMAND(pack(learnt) == file);
+  if (int64_t{learnt.width} * learnt.height > 64) return;
+  for (Method method : {Method::robust, Method::qdmd}) {
+    EngineOptions options;
+    options.mode = Mode::live;
+    options.window_size = 3;
+    options.threads = 1;
+    options.method = method;
+    options.colours = learnt.colours;
+    Engine engine;
+    QDMD_DEMAND(engine.configure(options, learnt.width, learnt.height).ok());
+    if (!engine.learn_from(learnt).ok()) continue;
+    const auto pixels = static_cast<size_t>(learnt.width * learnt.height);
+    Bytes frame(3 * pixels, 77), out(3 * pixels);
+    ImageView in;
+    MutableImageView picture;
+    for (size_t c = 0; c < 3; ++c) {
+      in.channel[c] = frame.data() + c * pixels;
+      picture.channel[c] = out.data() + c * pixels;
+    }
+    in.width = picture.width = learnt.width;
+    in.height = picture.height = learnt.height;
+    in.pixel_stride = picture.pixel_stride = 1;
+    in.row_stride = picture.row_stride = learnt.width;
+    for (int t = 0; t < 4; ++t) {
+      QDMD_DEMAND(engine.push(in).ok());
+      engine.pop(t % 2 ? Output::mask : Output::background, picture);
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  fuzz::Bytes bytes(data, size);
+  Bytes file;
+  const int kind = bytes.below(4);
+  if (kind == 0) {
+    const std::string all = bytes.rest();
+    file.assign(all.begin(), all.end());
+  } else {
+    file = pack(any_learnt(&bytes));
+    // Numbers of the header and of the rest are lied about, in a file that is sound otherwise.
+    for (int lies = bytes.below(4); lies > 0; --lies) {
+      const size_t at = bytes.once_in(2) ? static_cast<size_t>(bytes.below(14)) * 4 : bytes.byte();
+      put(&file, at, static_cast<uint32_t>(bytes.any_int()), bytes.once_in(2) ? 4 : 1);
+    }
+    if (bytes.once_in(4)) file.resize(file.size() - std::min<size_t>(file.size(), bytes.byte()));
+    if (kind > 1) put_checksum(&file);
+  }
+  const uint64_t said = bytes.once_in(8) ? bytes.word() : file.size();
+  const size_t seen = std::min(file.size(), kLearntHeaderBytes);
+  const Status header = check_header({file.data(), seen}, said);
+  QDMD_DEMAND(header.ok() || !header.message.empty());
+
+  Learnt learnt;
+  learnt.width = -5;
+  const Status status = unpack(file, &learnt);
+  if (status.ok()) {
+    use(learnt, file);
+  } else {
+    QDMD_DEMAND(status.code == Status::Code::bad_file && !status.message.empty());
+    QDMD_DEMAND(learnt.width == -5);
+  }
+  return 0;
+}
