@@ -34,8 +34,8 @@ int most_snapshots(int window_size) {
 // One frame in so many may be remembered, for so many windows.
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
 
-// A solve changed little if cells moved by less than a level in each channel on average, and
-// and no more than a twentieth of them by two. Noise and clouds stay below that; a background of
+// A solve changed little if cells moved by less than a level in each channel on average, and no
+// more than a twentieth of them by two. Noise and clouds stay below that; a background of
 // which parts are still hidden does not.
 constexpr float kCalmMean = 3, kCalmCell = 6, kMostMoved = 0.05f;
 
@@ -172,6 +172,8 @@ void RobustLearner::forget() {
 }
 
 void RobustLearner::publish() {
+  // Not while the solve runs: frames that come beside it mend what it would be compared with.
+  calm_ = is_calm() ? calm_ + 1 : 0;
   published_ = 1 - published_;
   if (!std::exchange(scene_begins_, false)) return;
   looks_.forget();
@@ -584,7 +586,7 @@ void RobustLearner::keep_some() {
   }
 }
 
-// What this solve found is what the one in use has.
+// What the newest solve found is what the one in use has.
 bool RobustLearner::is_calm() const {
   if (snapshots_->size() < room_.window_size || start_frames_ == 0) return false;
   double sum = 0;
@@ -606,7 +608,6 @@ void RobustLearner::end(BackgroundModel* model) {
   const uint8_t* const level[kChannels] = {reference_.level[0].data(), reference_.level[1].data(),
                                            reference_.level[2].data()};
   find_cells(grid_, band_, level, &background_cells_, 1 - published_);
-  calm_ = is_calm() ? calm_ + 1 : 0;
   if (parameters_.earlier_share > 0)
     earlier_.take(grid_, reference_, spread_, background_cells_, 1 - published_, stable_,
                   start_frames_, fresh_);
