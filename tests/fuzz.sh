@@ -29,11 +29,11 @@ tests/install-dependencies.sh build test fuzz
 build=build-fuzz
 again=()
 [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
-# Of undefined behaviour what numbers do, and no optimization: with all kinds of it, and Eigen, the
-# rest would take most of an hour to compile.
+# Of undefined behaviour what numbers do: with all kinds of it, and Eigen, the rest would take most
+# of an hour to compile.
 checks=signed-integer-overflow,shift,float-cast-overflow,integer-divide-by-zero
-CXX=clang++ meson setup "${again[@]}" "$build" -Dfuzz=true -Dtests=enabled -Dscene=enabled \
-  -Db_sanitize=address -Db_lundef=false -Doptimization=0 -Ddebug=false -Dwerror=false \
+CXX="${FUZZ_CXX:-clang++}" meson setup "${again[@]}" "$build" -Dfuzz=true -Dtests=enabled -Dscene=enabled \
+  -Db_sanitize=address -Db_lundef=false -Doptimization=1 -Ddebug=false -Dwerror=false \
   -Dcpp_args="-fsanitize=fuzzer-no-link,$checks -fno-sanitize-recover=all" \
   -Dcpp_link_args="-fsanitize=$checks" >"$build.log" ||
   { tail -n 20 "$build.log" >&2; exit 1; }

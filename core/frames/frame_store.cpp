@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "core/passes/chroma.h"
 #include "core/passes/digits.h"
@@ -64,6 +65,7 @@ FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameCon
   if (contents.cells_along > 0) {
     grid_ = Grid(width, band.height(), contents.cells_along);
     cells_ = GridFrames(grid_, capacity);
+    if (!band.is_whole()) to_share_.resize(static_cast<size_t>(capacity), 0);
   }
 }
 
@@ -133,7 +135,20 @@ void FrameStore::take_contents(int slot) {
                      band_.own_end() - top, sample_step_, low_samples_.plane(slot, c));
     }
   }
-  if (cells_.cells() > 0) find_cells(grid_, band_, planes, &cells_, slot);
+  if (cells_.cells() == 0) return;
+  find_own_cells(grid_, band_, planes, &cells_, slot);
+  if (band_.is_whole()) return;
+  to_share_[static_cast<size_t>(slot)] = 1;
+  any_to_share_ = true;
+}
+
+const GridFrames& FrameStore::cells() const {
+  if (!any_to_share_) return cells_;
+  for (size_t slot = 0; slot < to_share_.size(); ++slot)
+    if (std::exchange(to_share_[slot], 0))
+      share_cells(grid_, band_, &cells_, static_cast<int>(slot));
+  any_to_share_ = false;
+  return cells_;
 }
 
 bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {

@@ -83,7 +83,9 @@ class FrameStore {
   // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.
   const PlaneSlots& samples() const { return sample_step_ > 1 ? samples_ : planes_; }
   const Grid& grid() const { return grid_; }
-  const GridFrames& cells() const { return cells_; }
+  // Of a band, all members call this alike: what each found since the last call becomes everybody's
+  // here, so that no member waits for others with each frame.
+  const GridFrames& cells() const;
   // Samples of alpha in row order, or null where all are constant_alpha().
   const uint8_t* alpha(int slot) const;
   // Where the frame's camera looked; and, where that is not at rest, its planes as they came.
@@ -121,7 +123,10 @@ class FrameStore {
   Window planes_;
   PlaneSlots samples_, low_, low_samples_;
   Grid grid_;
-  GridFrames cells_;
+  // Only a band's are to be shared: others do not change by being looked at.
+  mutable GridFrames cells_;
+  mutable std::vector<uint8_t> to_share_;
+  mutable bool any_to_share_ = false;
   // Chroma of the newest frame, a sample for each pixel, where something is made of it.
   std::vector<uint8_t> spread_;
   // Video with alpha is nearly always opaque: its planes are kept only once one varies.

@@ -98,12 +98,15 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
   means_of_rows(grid, 0, grid.rows, plane, 0, means);
 }
 
-void find_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
-                GridFrames* cells, int frame) {
+void find_own_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
+                    GridFrames* cells, int frame) {
   const int first = row_at(grid, band.own_first()), end = row_at(grid, band.own_end());
   for (int c = 0; c < kChannels; ++c)
     means_of_rows(grid, first, end, planes[c], band.first(),
                   cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
+}
+
+void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame) {
   if (band.is_whole()) return;
   std::vector<size_t> ends;
   for (int rank = 0; rank < band.members(); ++rank)

@@ -57,8 +57,10 @@ class GridFrames {
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
 // The same of all planes of a picture into picture `frame` of `cells`, where `planes` have the
-// band's rows only: members share what they find. Bands end where rows of cells do.
-void find_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
-                GridFrames* cells, int frame);
+// band's rows only: the cells of its own rows. Bands end where rows of cells do.
+void find_own_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
+                    GridFrames* cells, int frame);
+// All members have the cells that each of them found, for good.
+void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame);
 
 }  // namespace qdmd

@@ -255,6 +255,8 @@ ImageView FrameReader::view() const {
   const uint8_t* const top = plane + (wanted.first - left.first) * stride;
   // B, G, R and a byte of nothing.
   for (int c = 0; c < 3; ++c) view.channel[c] = top + 2 - c;
+  view.alpha = top + 3;
+  view.alpha_is_padding = true;
   view.width = info_.width;
   view.height = wanted.count;
   view.pixel_stride = 4;

@@ -108,7 +108,17 @@ class Job {
     const auto start = Clock::now();
     const bool some = reader_.next();
     reading_ += since(start);
-    return team_ ? team_->all_have(some) : some;
+    return some;
+  }
+
+  // With each window, not with each frame: processes need not decode in step.
+  void agree_on(int64_t read) {
+    if (!team_) return;
+    int64_t first[] = {read};
+    team_->tell(first);
+    if (team_->agree(first[0] != read) != 0)
+      throw std::runtime_error("processes find another number of frames in the recording, this one " +
+                               std::to_string(read) + ": do all machines have the same files?");
   }
 
   void configure() {
@@ -154,6 +164,7 @@ class Job {
     while (next_frame()) {
       if (++read <= first) continue;
       if (!engine_.configured()) {
+        if (team_) team_->all_have(true);
         configure();
         line_.begin(reader_.share());
       }
@@ -164,8 +175,10 @@ class Job {
       line_.show(reader_.share(), read, done_.windows + 1);
       if (static_cast<int64_t>(times.size()) == window_size()) end_window(&times, read);
     }
-    if (read == 0) throw std::runtime_error("the recording has no frame");
     if (!times.empty()) end_window(&times, read);
+    if (team_ && !engine_.configured()) team_->all_have(false);
+    agree_on(read);
+    if (read == 0) throw std::runtime_error("the recording has no frame");
     frames_ = read - std::min(first, read);
     done_.ended = true;
     if (read < done_.frames)
@@ -179,6 +192,7 @@ class Job {
 
   // Writes what a window gives, unless that was done before.
   void end_window(std::vector<GstClockTime>* times, int64_t read) {
+    agree_on(read);
     const auto start = Clock::now();
     check(engine_.drain());
     solving_ += since(start);
