@@ -13,7 +13,8 @@ namespace qdmd {
 
 // How the samples of a format lie in memory.
 inline SampleBits bits_of(const GstVideoInfo& info) {
-  return {GST_VIDEO_INFO_COMP_DEPTH(&info, 0), int(GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0))};
+  return {int(GST_VIDEO_INFO_COMP_DEPTH(&info, 0)),
+          int(GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0))};
 }
 
 // What black, white and neutral chroma are, in the highest 8 bits, full or limited range as the
