@@ -5,11 +5,13 @@
 namespace qdmd {
 
 Restorer::Restorer(int width, int height) : width_(width), height_(height) {
-  const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  const auto make = [this](Plane* plane) {
+    *plane = std::make_unique_for_overwrite<uint8_t[]>(pixels());
+  };
   for (auto* planes : {&canvas_, &level_})
-    for (auto& plane : *planes) plane.resize(pixels);
-  mask_.resize(pixels);
-  shaded_.resize(pixels);
+    for (Plane& plane : *planes) make(&plane);
+  make(&mask_);
+  make(&shaded_);
 }
 
 uint64_t Restorer::bytes(int width, int height) {
@@ -18,8 +20,8 @@ uint64_t Restorer::bytes(int width, int height) {
 
 void Restorer::write_canvas(const BackgroundModel& model, size_t pixels) {
   for (size_t first = 0; first < pixels; first += kMaxRun) {
-    uint8_t* const out[3] = {canvas_[0].data() + first, canvas_[1].data() + first,
-                             canvas_[2].data() + first};
+    uint8_t* const out[3] = {canvas_[0].get() + first, canvas_[1].get() + first,
+                             canvas_[2].get() + first};
     model.evaluate(first, std::min(kMaxRun, pixels - first), out);
   }
 }
@@ -29,20 +31,19 @@ void Restorer::restore_level(const Pose& pose, const uint8_t* const frame[3], Re
   resampler->prepare(pool);
   const Affine place = affine(pose, middle_of(width_, height_));
   for (size_t c = 0; c < kChannels; ++c) {
-    std::copy_n(frame[c], level_[c].size(), level_[c].data());
-    resampler->run(canvas_[c].data(), place, level_[c].data(), width_, height_, pool);
+    std::copy_n(frame[c], pixels(), level_[c].get());
+    resampler->run(canvas_[c].get(), place, level_[c].get(), width_, height_, pool);
   }
 }
 
 uint8_t* Restorer::restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
-                           Pool* pool, std::vector<uint8_t>* out) {
+                           Pool* pool, uint8_t* out) const {
   resampler->prepare(pool);
-  std::fill(out->begin(), out->end(), uint8_t{0});
-  resampler->run(mask, affine(pose, middle_of(width_, height_)), out->data(), width_, height_,
-                 pool);
+  std::fill_n(out, pixels(), uint8_t{0});
+  resampler->run(mask, affine(pose, middle_of(width_, height_)), out, width_, height_, pool);
   if (hard)
-    for (uint8_t& sample : *out) sample = sample >= 128 ? 255 : 0;
-  return out->data();
+    for (size_t p = 0; p < pixels(); ++p) out[p] = out[p] >= 128 ? 255 : 0;
+  return out;
 }
 
 }  // namespace qdmd

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <memory>
 
 #include "core/align/resampler.h"
 #include "core/base/channels.h"
@@ -20,29 +20,32 @@ class Restorer {
 
   // Takes a background's picture as it is on the canvas, which is `pixels` large.
   void write_canvas(const BackgroundModel& model, size_t pixels);
-  const uint8_t* canvas(int channel) const { return canvas_[static_cast<size_t>(channel)].data(); }
+  const uint8_t* canvas(int channel) const { return canvas_[static_cast<size_t>(channel)].get(); }
   // The same picture seen from `pose`; frame: the frame's own planes.
   void restore_level(const Pose& pose, const uint8_t* const frame[3], Resampler* resampler,
                      Pool* pool);
-  const uint8_t* level(int channel) const { return level_[static_cast<size_t>(channel)].data(); }
+  const uint8_t* level(int channel) const { return level_[static_cast<size_t>(channel)].get(); }
 
   // A mask on the canvas, of 255 and 0 where it is hard, seen from `pose`.
   uint8_t* restore_mask(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
                         Pool* pool) {
-    return restore(pose, mask, hard, resampler, pool, &mask_);
+    return restore(pose, mask, hard, resampler, pool, mask_.get());
   }
   // The same of a second one.
   uint8_t* restore_shaded(const Pose& pose, const uint8_t* shaded, Resampler* resampler,
                           Pool* pool) {
-    return restore(pose, shaded, true, resampler, pool, &shaded_);
+    return restore(pose, shaded, true, resampler, pool, shaded_.get());
   }
 
  private:
   uint8_t* restore(const Pose& pose, const uint8_t* mask, bool hard, Resampler* resampler,
-                   Pool* pool, std::vector<uint8_t>* out);
+                   Pool* pool, uint8_t* out) const;
+  size_t pixels() const { return static_cast<size_t>(width_) * static_cast<size_t>(height_); }
 
   int width_, height_;
-  std::vector<uint8_t> canvas_[kChannels], level_[kChannels], mask_, shaded_;
+  // Pages are touched once they are used: most cameras stand still.
+  using Plane = std::unique_ptr<uint8_t[]>;
+  Plane canvas_[kChannels], level_[kChannels], mask_, shaded_;
 };
 
 }  // namespace qdmd

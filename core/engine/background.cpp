@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/model/build_spread.h"
+#include "core/passes/read_samples.h"
+
 namespace qdmd {
 
 namespace {
@@ -98,8 +101,12 @@ void Background::finish(const MaskWishes& wishes) {
 // Whatever a learner did: no model with a number that is not one is ever in use.
 void Background::replace_next() {
   BackgroundModel& model = models_[next()];
-  model.begin(room_.frames->whole(*snapshots_), mean_of_frames(snapshots_->size()), true);
-  model.build_slice(0, pixels());
+  const SnapshotRange snapshots = room_.frames->whole(*snapshots_);
+  model.begin(snapshots, mean_of_frames(snapshots.size()), true);
+  if (snapshots.shape().is_shared())
+    build_spread(snapshots, 0, pixels(), room_.pool, &model);
+  else
+    model.build_slice(0, pixels());
   next_report_.replaced = true;
   next_report_.dmd = {};
   next_report_.dmd.rank = next_report_.dmd.background_modes = 1;
@@ -113,11 +120,12 @@ void Background::rehearse(const MaskWishes& wishes) {
   const bool fixed = wishes.threshold > 0;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
+  std::vector<uint8_t> room(room_for_planes(snapshots_->shape()));
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
     Comparison frame = {
         {}, &model, foreground.threshold, fixed ? nullptr : model.limits(), fixed, &wishes.ignored};
-    for (int c = 0; c < kChannels; ++c) frame.x[c] = snapshots_->plane(t, c);
+    read_planes(snapshots_->picture(t), room.data(), frame.x);
     decision_.decide(frame, room_.pool);
   }
 }

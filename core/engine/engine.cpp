@@ -8,6 +8,7 @@
 #include "core/engine/live_schedule.h"
 #include "core/foreground/picture.h"
 #include "core/passes/bands.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/residual.h"
 
 namespace qdmd {
@@ -37,7 +38,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   options_ = options;
   layout_ = layout_of(options, width, height);
   const Band band = band_of(options, width, height);
-  auto learner = Learner::make(options, width, band);
+  auto learner = learner_of(options, width, height);
   const bool live = options.mode == Mode::live;
   const LivePlan plan = plan_of(options, width, height);
   // What members tell each other has one order.
@@ -45,6 +46,9 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   const uint64_t beside = layout_.bytes - layout_.store_bytes;
   frames_ =
       FrameStore(layout_.capacity, width, band, learner->contents(), options.max_memory - beside);
+  // Its pages are touched once somebody wants more than the background.
+  next_chroma_ =
+      std::make_unique_for_overwrite<uint8_t[]>(room_for_planes(frames_.window().shape()));
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -82,11 +86,12 @@ void Engine::close() {
   stabilizer_.reset();
   restorer_.reset();
   frames_ = FrameStore();
+  next_chroma_.reset();
 }
 
 void Engine::flush() {
   queue_ = {};
-  decided_ = softened_ = false;
+  decided_ = softened_ = read_ = false;
   if (schedule_) {
     schedule_->restart();
     background_->forget();
@@ -111,6 +116,11 @@ Status Engine::push(const ImageView& frame) {
   if (frame.bits.depth != options_.depth)
     return {Status::Code::invalid_options, "configure the engine anew for samples of other depth"};
   const Clock::Span span(clock_, Clock::frames);
+  const Spacing chroma = frame.spacing(1);
+  const ChromaShape& shape = frames_.window().shape();
+  if (shape.is_shared() && (chroma.columns != shape.columns || chroma.rows != shape.rows))
+    return {Status::Code::invalid_options,
+            "configure the engine anew for frames whose pixels share other samples"};
   return flushed_if_it_throws([&]() -> Status {
     workers_->follow();
     schedule_->begin_push();
@@ -186,7 +196,7 @@ void Engine::set_shadows(Shadows shadows) {
 OutputTask Engine::task_of(Output output) {
   OutputTask task = {};
   // The background needs no frame, but rows of one are skipped over.
-  for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(0, c);
+  for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(0, 0);
   task.model = &background_->model();
   task.output = output;
   task.constant_alpha = 255;
@@ -199,7 +209,7 @@ OutputTask Engine::next_task(Output output) {
   const int index = frames_.size() - queue_.pending, slot = frames_.slot(index);
   schedule_->show(index);
   OutputTask task = task_of(output);
-  for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(slot, c);
+  if (output != Output::background) read_next(slot, task.x);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
   if (frames_.low_bits() > 0) {
@@ -208,6 +218,13 @@ OutputTask Engine::next_task(Output output) {
     task.constant_alpha_low = frames_.constant_alpha_low(slot);
   }
   return task;
+}
+
+// Where pixels share samples, once a frame.
+void Engine::read_next(int slot, const uint8_t* planes[kChannels]) {
+  if (!read_) read_planes(frames_.window().picture(slot), next_chroma_.get(), next_);
+  read_ = true;
+  std::copy_n(next_, kChannels, planes);
 }
 
 // Once a frame.
@@ -371,7 +388,7 @@ void Engine::skip() {
   if (soft_mask_ && !softened_) soft_mask_->forget();
   --queue_.pending;
   --queue_.ready;
-  decided_ = softened_ = false;
+  decided_ = softened_ = read_ = false;
 }
 
 void Engine::pop(Output output, const MutableImageView& out) {

@@ -153,6 +153,7 @@ class Engine {
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
   void return_to_frame(OutputTask* task, bool level);
+  void read_next(int slot, const uint8_t* planes[kChannels]);
   void decide_next(OutputTask* task);
   void soften(const Levels& levels, OutputTask* task);
   void pass_wishes();
@@ -176,7 +177,10 @@ class Engine {
   std::unique_ptr<SoftMask> soft_mask_;
   std::unique_ptr<Schedule> schedule_;
   Queue queue_;
-  bool decided_ = false, softened_ = false;  // the frame that leaves next
+  // Of the frame that leaves next.
+  bool decided_ = false, softened_ = false, read_ = false;
+  const uint8_t* next_[kChannels] = {};
+  std::unique_ptr<uint8_t[]> next_chroma_;  // of each pixel, where pixels share samples
   // The last member: its threads end before what they work on.
   std::unique_ptr<Workers> workers_;
 };

@@ -9,6 +9,7 @@
 #include "core/learn/learner.h"
 #include "core/learn/robust/robust_learner.h"
 #include "core/parallel/workers.h"
+#include "core/passes/read_samples.h"
 
 namespace qdmd {
 namespace {
@@ -16,10 +17,12 @@ namespace {
 // The most that may share pictures of this size: each has rows of cells.
 int most_members(int width, int height) { return Grid(width, height).rows; }
 
-// More than the sums of a Gram matrix can hold. Bytes of fewer pixels, in any window, are below
-// 2^63.
+// More than the sums of a Gram matrix can hold, or rows that are longer than a pass adds up. Bytes
+// of fewer pixels, in any window, are below 2^63.
 bool has_too_many_pixels(int width, int height) {
-  return static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
+  constexpr int kLongestSide = 1 << 24;
+  return width > kLongestSide || height > kLongestSide ||
+         static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
 }
 
 LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
@@ -56,12 +59,12 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   layout.capacity = options.window_size + late_frames;
   // They are read until the last of them has left.
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
-  layout.frame_bytes =
-      (options.depth > 8 ? 2 : 1) *
-      PlaneSlots::bytes(layout.capacity, static_cast<size_t>(width) * static_cast<size_t>(height));
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, learner.contents());
+  const FrameContents contents = learner.contents();
+  const ChromaShape shape = {width, height, contents.chroma_columns, contents.chroma_rows};
+  layout.frame_bytes = (options.depth > 8 ? 2 : 1) * PlaneSlots::bytes(layout.capacity, shape);
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, contents);
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
-  const uint64_t masks = Decision::bytes(width, band) + layout.soft_bytes;
+  const uint64_t masks = Decision::bytes(width, band) + layout.soft_bytes + room_for_planes(shape);
   const uint64_t camera = options.stabilize == Stabilize::off
                               ? 0
                               : Stabilizer::bytes(width, height) + Restorer::bytes(width, height);
@@ -75,8 +78,14 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
 }  // namespace
 
 LivePlan plan_of(const EngineOptions& options, int width, int height) {
-  return plan_for(options, *Learner::make(options, width, band_of(options, width, height)), width,
-                  height);
+  return plan_for(options, *learner_of(options, width, height), width, height);
+}
+
+std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int height) {
+  LearnOptions learnt = options;
+  const bool moves = options.stabilize != Stabilize::off && options.method != Method::robust;
+  if (moves || options.team) learnt.chroma_columns = learnt.chroma_rows = 1;
+  return Learner::make(learnt, width, band_of(options, width, height));
 }
 
 Models models_of(Mode mode, int late_frames) {
@@ -90,7 +99,7 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height) {
     layout.bytes = UINT64_MAX;
     return layout;
   }
-  const auto learner = Learner::make(options, width, band_of(options, width, height));
+  const auto learner = learner_of(options, width, height);
   if (options.mode == Mode::live)
     return layout_with(options, *learner, width, height,
                        plan_for(options, *learner, width, height).most_late_frames());
@@ -168,6 +177,9 @@ Status check_options(const EngineOptions& options, int width, int height) {
     return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
   if (options.depth < 8 || options.depth > EngineOptions::kMostDepth)
     return {Code::invalid_options, "a sample has 8 to 16 bits"};
+  if (options.chroma_columns < 1 || options.chroma_columns > 2 || options.chroma_rows < 1 ||
+      options.chroma_rows > 2)
+    return {Code::invalid_options, "one or two pixels in a row or column share a sample"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};

@@ -59,6 +59,10 @@ EngineLayout layout_of(const EngineOptions& options, int width, int height);
 // pictures of its own ones. Without a team: all.
 Band band_of(const EngineOptions& options, int width, int height);
 
+// The learner of these options. Frames that a camera's movement moves share no samples, which only
+// a learner whose solves are one piece can meet while frames come.
+std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int height);
+
 // Models of batch and live mode.
 Models models_of(Mode mode, int late_frames);
 

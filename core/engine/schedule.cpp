@@ -23,7 +23,11 @@ bool Schedule::take(const ImageView& frame) {
   const PlaneSlots& planes = frames().window();
   const int slot = frames().window().newest_slot(), channel = stabilizer->channel();
   const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
-  if (!pose.is_rest())
+  if (!pose.is_rest() && frames().shares_samples()) {
+    wait();
+    no_room_ = !frames().unshare();
+  }
+  if (!pose.is_rest() && !no_room_)
     no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());
   if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
   return true;

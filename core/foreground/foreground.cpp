@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/passes/planes.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/residual.h"
 #include "core/passes/soft_edge.h"
 
@@ -73,11 +74,15 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       uint8_t counted[kMaxRun];
       std::fill_n(counted, count, uint8_t{1});
       ignored.clear_run(begin, count, width, counted);
+      const uint8_t* x[kChannels];
+      uint8_t room[kChannels][kMaxRun];
+      for (int c = 0; c < kChannels; ++c)
+        x[c] = read_samples(snapshots, t, c, first, count, room[c]);
       for (size_t p = 0; p < count; ++p) {
         if (!counted[p]) continue;
         int squared = 0;
         for (int c = 0; c < kChannels; ++c) {
-          const int difference = snapshots.plane(t, c)[first + p] - background.level[c][p];
+          const int difference = x[c][p] - background.level[c][p];
           squared += difference * difference;
         }
         const double norm = std::sqrt(squared);

@@ -12,7 +12,7 @@ constexpr int kWholeTile = kSoftTile + 2 * soft_halo(kMostSoftness);
 // Shares of the threshold: less contrast is no edge, and what becomes foreground changes by more.
 constexpr double kFlat = 1.0 / 4, kStill = 1;
 
-int tiles_along(int size) { return (size + kSoftTile - 1) / kSoftTile; }
+int tiles_along(int size) { return size / kSoftTile + (size % kSoftTile != 0); }
 
 // Repeats the first and the last of the samples first .. end - 1 of a row.
 void repeat_ends(uint8_t* row, int first, int end, int count) {

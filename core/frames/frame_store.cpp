@@ -27,11 +27,12 @@ size_t samples_of(const Band& band, int width, int step) {
   return static_cast<size_t>(band.samples(step)) * sample_count(width, step);
 }
 
-// Samples of chroma that are spread to all pixels; of deep ones two digits of a row.
+// Samples of chroma that are spread to pixels at a time; of deep ones two digits of a row.
 size_t spread_size(int width, int height, const FrameContents& contents) {
-  if (contents.low_bits > 0) return 2 * static_cast<size_t>(width);
-  const bool needed = contents.sample_step > 1 || contents.cells_along > 0;
-  return needed && contents.chroma_columns > 1 ? 2 * pixels_of(width, height) : 0;
+  if (contents.low_bits == 0 && contents.chroma_columns == 1) return 0;
+  return contents.cells_along > 0 && contents.chroma_columns > 1
+             ? cells_room(Grid(width, height, contents.cells_along))
+             : 2 * static_cast<size_t>(width);
 }
 
 // What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
@@ -120,23 +121,29 @@ bool FrameStore::append(const ImageView& frame) {
 
 // What is made of the planes.
 void FrameStore::take_contents(int slot) {
-  const uint8_t* planes[3] = {};
-  if (sample_step_ > 1 || cells_.cells() > 0) read_planes(planes_, slot, spread_.data(), planes);
+  const KeptPicture picture = planes_.picture(slot);
   if (sample_step_ > 1) {
     samples_.pad(slot);
-    const int top = band_.first_sample(sample_step_);
-    for (int c = 0; c < kChannels; ++c)
-      take_samples(planes[c] + ptrdiff_t{top - band_.first()} * width_, width_,
-                   band_.own_end() - top, sample_step_, samples_.plane(slot, c));
+    const int top = band_.first_sample(sample_step_) - band_.first(),
+              end = band_.own_end() - band_.first();
+    RowReader reader(picture, width_, spread_.data());
+    const size_t along = sample_count(width_, sample_step_);
+    uint8_t* to[] = {samples_.plane(slot, 0), samples_.plane(slot, 1), samples_.plane(slot, 2)};
+    for (int y = top; y < end; y += sample_step_) {
+      const uint8_t* rows[kChannels];
+      reader.read(y, rows);
+      for (int c = 0; c < kChannels; to[c++] += along)
+        take_samples(rows[c], width_, 1, sample_step_, to[c]);
+    }
     if (low_bits_ > 0) {
       low_samples_.pad(slot);
       for (int c = 0; c < kChannels; ++c)
-        take_samples(low_.plane(slot, c) + ptrdiff_t{top - band_.first()} * width_, width_,
-                     band_.own_end() - top, sample_step_, low_samples_.plane(slot, c));
+        take_samples(low_.plane(slot, c) + ptrdiff_t{top} * width_, width_, end - top, sample_step_,
+                     low_samples_.plane(slot, c));
     }
   }
   if (cells_.cells() == 0) return;
-  find_own_cells(grid_, band_, planes, &cells_, slot);
+  find_own_cells(grid_, band_, picture, &cells_, slot, spread_.data());
   if (band_.is_whole()) return;
   to_share_[static_cast<size_t>(slot)] = 1;
   any_to_share_ = true;
@@ -151,8 +158,23 @@ const GridFrames& FrameStore::cells() const {
   return cells_;
 }
 
+bool FrameStore::unshare() {
+  const uint64_t more = PlaneSlots::bytes(capacity(), planes_.pixels());
+  if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
+  Window window = planes_.unshared();
+  std::vector<uint8_t> room(room_for_planes(planes_.shape()));
+  for (int i = 0; i < planes_.size(); ++i) {
+    const uint8_t* planes[3];
+    read_planes(planes_.picture(slot(i)), room.data(), planes);
+    window.pad(slot(i));
+    for (int c = 0; c < kChannels; ++c)
+      std::copy_n(planes[c], planes_.pixels(), window.plane(slot(i), c));
+  }
+  planes_ = std::move(window);
+  return true;
+}
+
 bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {
-  if (planes_.shape().is_shared()) return false;
   if (untouched_.capacity() == 0) {
     const uint64_t more = (low_bits_ > 0 ? 2 : 1) * PlaneSlots::bytes(capacity(), planes_.pixels());
     if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;

@@ -54,8 +54,12 @@ class FrameStore {
   // as they came stay in untouched(). Of more than 8 bits, moved planes have the highest 8, and
   // below them the middle of what there can be. What is outside of the frame is as in the frame
   // before, or, where there is none, as in this one. False, and nothing is done: there is no room
-  // in `most_bytes`, or the frame's pixels share samples. Throws std::bad_alloc.
+  // in `most_bytes`. Throws std::bad_alloc.
   bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
+  // What moves shares no samples: before steady(), once, each pixel of all frames gets its own.
+  // Nobody reads frames then. False: there is no room. Throws std::bad_alloc.
+  bool shares_samples() const { return planes_.shape().is_shared(); }
+  bool unshare();
   // Forgets all frames.
   void clear() { planes_.clear(); }
 

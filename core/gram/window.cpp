@@ -46,6 +46,13 @@ void PlaneSlots::resize(size_t pixels) {
   plane_size_ = chroma_size_ = padded(pixels);
 }
 
+Window Window::unshared() const {
+  Window window(capacity(), pixels());
+  window.oldest_ = oldest_;
+  window.size_ = size_;
+  return window;
+}
+
 int Window::append() {
   if (size_ == capacity()) {
     oldest_ = (oldest_ + 1) % capacity();

@@ -25,6 +25,15 @@ struct ChromaShape {
   }
 };
 
+// The planes of a picture: of channels 1 and 2 the shared samples, where the shape says so.
+struct KeptPicture {
+  KeptPicture(const uint8_t* const planes[kChannels], const ChromaShape& shared = {})  // NOLINT
+      : plane{planes[0], planes[1], planes[2]}, shape(shared) {}
+
+  const uint8_t* plane[kChannels];
+  ChromaShape shape;  // nothing where each pixel has its own samples
+};
+
 // `capacity` slots of three planes of 8-bit samples each. Planes start at multiples of 64 bytes and
 // are padded with zeros, which add nothing to an inner product.
 class PlaneSlots {
@@ -54,6 +63,10 @@ class PlaneSlots {
 
   const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
   uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
+  KeptPicture picture(int slot) const {
+    const uint8_t* const planes[] = {plane(slot, 0), plane(slot, 1), plane(slot, 2)};
+    return {planes, shape_};
+  }
   // Zeros behind the samples of a slot's planes, whose first ones, as many as a plane has, the
   // caller fills.
   void pad(int slot);
@@ -96,6 +109,9 @@ class Window : public PlaneSlots {
   // Makes room for the newest snapshot, dropping the oldest of a full window, and returns its slot.
   // The caller fills the three planes' first pixels() samples.
   int append();
+  // The same snapshots in the same slots, where each pixel has its own samples: the caller fills
+  // them. Throws std::bad_alloc.
+  Window unshared() const;
   void clear() { oldest_ = size_ = 0; }
 
  private:
@@ -121,6 +137,8 @@ class SnapshotRange {
   const uint8_t* plane(int index, int channel) const {
     return planes_->plane(slot(index), channel);
   }
+
+  KeptPicture picture(int index) const { return planes_->picture(slot(index)); }
 
   // Its last `count` snapshots.
   SnapshotRange newest(int count) const {

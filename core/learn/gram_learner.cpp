@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/dmd/qdmd.h"
-#include "core/passes/read_samples.h"
+#include "core/model/build_spread.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -17,9 +17,6 @@ constexpr int kChosenStep = 1;
 constexpr size_t kPixelsPerPart = 16384;
 
 constexpr size_t kUnit = BackgroundModel::kSliceUnit;
-
-// Pixels of all snapshots that are spread at once: they stay in the second-level cache.
-constexpr size_t kRun = 1024;
 
 // Of samples in units of 1 / 2^low_bits levels, in levels. Sensitivity is a ratio.
 void put_in_levels(int low_bits, DmdSummary* summary) {
@@ -41,6 +38,18 @@ GramLearner::GramLearner(const LearnOptions& options, int width, const Band& ban
       height_(band.rows()),
       step_(options.sample_step > 0 ? options.sample_step : kChosenStep) {}
 
+// Solvers that read pixels want each to have its own samples.
+bool GramLearner::keeps_shared() const {
+  return options_.keeps_shared() && band_.is_whole() &&
+         (options_.method == Method::dmd ||
+          (options_.dmd.solver != Solver::qr && options_.dmd.solver != Solver::adjoint));
+}
+
+FrameContents GramLearner::contents() const {
+  if (!keeps_shared()) return {step_, 0, 1, 1, options_.low_bits()};
+  return {step_, 0, options_.chroma_columns, options_.chroma_rows};
+}
+
 uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int threads) const {
   const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
   DmdOptions dmd = options_.dmd;
@@ -49,19 +58,24 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
                                                       : most_pictures(dmd, window_size);
   const double seen = pixels_seen();
   const bool deep = options_.low_bits() > 0;
-  return SlidingGram::bytes(capacity, threads, {}, deep ? 2 : 1) +
+  const ChromaShape shape =
+      step_ == 1 && keeps_shared()
+          ? ChromaShape{width_, height_, options_.chroma_columns, options_.chroma_rows}
+          : ChromaShape{};
+  return SlidingGram::bytes(capacity, threads, shape, deep ? 2 : 1) +
          (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
                                          : decomposition_bytes(dmd, seen, window_size)) +
-         (models == Models::one ? 1 : 2) * BackgroundModel::bytes(pixels, window_size, pictures,
-                                                                  models == Models::two_of_live,
-                                                                  deep);
+         (models == Models::one ? 1 : 2) *
+             BackgroundModel::bytes(pixels, window_size, pictures,
+                                    keeps_shared() || models == Models::two_of_live, deep) +
+         (keeps_shared() ? build_spread_bytes(window_size, threads) : 0);
 }
 
 bool GramLearner::may_read_frames(int window_size) const {
   const int pictures = options_.method == Method::dmd
                            ? most_channel_pictures(options_.dmd, window_size)
                            : most_pictures(options_.dmd, window_size);
-  return BackgroundModel::may_combine_directly(pictures, window_size);
+  return !keeps_shared() && BackgroundModel::may_combine_directly(pictures, window_size);
 }
 
 double GramLearner::solve_seconds(int window_size) const {
@@ -104,7 +118,7 @@ void GramLearner::begin(const LearnerRoom& room) {
   if (options_.low_bits() > 0)
     gram_ = SlidingGram(capacity, options_.low_bits(), room.pool);
   else if (shares_chroma())
-    gram_ = SlidingGram(capacity, room.frames->window().shape(), room.pool);
+    gram_ = SlidingGram(capacity, room.frames->samples().shape(), room.pool);
   else
     gram_ = SlidingGram(capacity, room.pool);
 }
@@ -174,41 +188,14 @@ void GramLearner::build(Slice slice, BackgroundModel* model) {
   }
   const size_t first = slice.first(snapshots_->pixels(), kUnit),
                length = slice.size(snapshots_->pixels(), kUnit);
-  const auto parts = static_cast<int>(std::max<size_t>(1, length / kPixelsPerPart));
   if (snapshots_->shape().is_shared()) {
-    build_spread(first, length, parts, model);
+    build_spread(*snapshots_, first, length, room_.pool, model);
     return;
   }
+  const auto parts = static_cast<int>(std::max<size_t>(1, length / kPixelsPerPart));
   room_.pool->run(static_cast<size_t>(parts), [&](size_t part) {
     const Slice band = {static_cast<int>(part), parts};
     model->build_slice(first + band.first(length, kUnit), band.size(length, kUnit));
-  });
-}
-
-// From chroma that is spread to pixels, run by run.
-void GramLearner::build_spread(size_t first, size_t length, int parts, BackgroundModel* model) {
-  const auto snapshots = static_cast<size_t>(snapshots_->size());
-  const size_t planes_of_chroma = (kChannels - 1) * snapshots;
-  // Taken here: tasks of the pool take no memory.
-  const auto room =
-      std::make_unique_for_overwrite<uint8_t[]>(planes_of_chroma * kRun * room_.pool->threads());
-  const auto planes = std::make_unique_for_overwrite<const uint8_t*[]>(kChannels * snapshots *
-                                                                       room_.pool->threads());
-  room_.pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
-    const Slice band = {static_cast<int>(part), parts};
-    const size_t end = first + band.first(length, kUnit) + band.size(length, kUnit);
-    const uint8_t** const of_run = planes.get() + worker * kChannels * snapshots;
-    for (size_t p = first + band.first(length, kUnit); p < end; p += kRun) {
-      const size_t count = std::min(kRun, end - p);
-      uint8_t* to = room.get() + worker * planes_of_chroma * kRun;
-      for (size_t t = 0; t < snapshots; ++t)
-        for (int c = 0; c < kChannels; ++c) {
-          of_run[kChannels * t + static_cast<size_t>(c)] =
-              read_samples(*snapshots_, static_cast<int>(t), c, p, count, to);
-          if (c > 0) to += kRun;
-        }
-      model->build_from(of_run, p, count);
-    }
   });
 }
 

@@ -15,7 +15,7 @@ class GramLearner : public Learner {
  public:
   GramLearner(const LearnOptions& options, int width, const Band& band);
 
-  FrameContents contents() const override { return {step_, 0, 1, 1, options_.low_bits()}; }
+  FrameContents contents() const override;
   std::vector<int> sample_steps() const override { return {step_}; }
   bool in_one_piece() const override { return false; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
@@ -30,8 +30,8 @@ class GramLearner : public Learner {
   SolveFacts facts() const override { return built_; }
 
  private:
+  bool keeps_shared() const;
   bool shares_chroma() const;
-  void build_spread(size_t first, size_t length, int parts, BackgroundModel* model);
   // What the decomposition sees of them.
   SnapshotRange columns_of(const SnapshotRange& snapshots) const;
   double pixels_seen() const;

@@ -22,9 +22,14 @@ struct LearnOptions {
   // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
   bool remembers = true;
   int depth = 8;  // bits of the frames' samples, 8 to 16
+  // Pixels that share a sample of channels 1 and 2 in all frames, as in ChromaShape. 1: each has
+  // its own, or frames differ, which takes more memory.
+  int chroma_columns = 1, chroma_rows = 1;
 
   static constexpr int kMostDepth = 16;
   int low_bits() const { return depth - 8; }
+  // Such samples are kept once.
+  bool keeps_shared() const { return depth == 8 && chroma_columns > 1; }
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
 };
 

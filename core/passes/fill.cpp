@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/passes/read_samples.h"
 #include "core/passes/unit_light.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -253,7 +254,7 @@ uint64_t WindowMask::bytes(int capacity, size_t pixels) {
 uint64_t Filler::bytes(int snapshots, bool deep) {
   const auto m = static_cast<uint64_t>(std::max(snapshots, 1));
   const uint64_t run = run_of(snapshots, deep), size = deep ? 2 : 1;
-  return (m + size * (m * kChannels + 1) + sizeof(uint16_t)) * run +
+  return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + 1) * run +
          m * kChannels * sizeof(uint8_t*);
 }
 
@@ -261,6 +262,7 @@ Filler::Filler(int snapshots, bool deep) : run_(run_of(snapshots, deep)) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
   keep_.resize(m * run_);
   masked_.resize(run_);
+  spread_.resize(run_);
   // One row more for the level.
   if (deep)
     list_rows(m * kChannels, &deep_samples_, &deep_planes_);
@@ -300,10 +302,13 @@ const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::ve
   const size_t padded = round_up(count);
   take_rows(snapshots, gains, mask, first, padded,
             [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
+              const bool own = channel == 0 || !snapshots.shape().is_shared();
+              const uint8_t* from = snapshots.plane(t, channel) + first;
+              if (!own) from = read_samples(snapshots, t, channel, first, count, spread_.data());
               // Planes are padded like runs.
               HWY_DYNAMIC_DISPATCH(take_row)
-              (snapshots.plane(t, channel) + first, keep, padded, factor,
-               snapshots.plane(next, channel) + first, samples_.data() + row);
+              (from, keep, padded, factor, own ? snapshots.plane(next, channel) + first : from,
+               samples_.data() + row);
             });
   uint8_t* level = samples_.data() + m * kChannels * run_;
   for (size_t c = 0; c < kChannels; ++c) {
@@ -348,22 +353,26 @@ void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const 
   fill_samples(reference, bits, x, gain, reach, {0, reference.height, step}, out);
 }
 
-void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
                   const Gain& gain, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]) {
   const bool lit = is_lit(gain);
+  SampleFinder samples(x, reference.width);
   size_t sample = 0;
-  for (int row = rows.first; row < rows.end; row += rows.step)
+  for (int row = rows.first; row < rows.end; row += rows.step) {
+    samples.seek(row);
     for (int col = 0; col < reference.width; col += rows.step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
       const int limit = is_masked(bits, p) ? 0 : reach[p];
       for (size_t c = 0; c < 3; ++c) {
         const int level = reference.level[c][p];
-        const int unit = lit ? out_of_light(x[c][p], gain[c]) : x[c][p];
+        const uint8_t own = samples.at(c, static_cast<size_t>(col));
+        const int unit = lit ? out_of_light(own, gain[c]) : own;
         out[c][sample] = static_cast<uint8_t>(std::clamp(unit, level - limit, level + limit));
       }
     }
+  }
 }
 
 }  // namespace qdmd

@@ -67,6 +67,7 @@ class Filler {
   std::vector<const uint8_t*> planes_;
   std::vector<const uint16_t*> deep_planes_;
   std::vector<uint16_t> masked_;  // snapshots, of each pixel
+  std::vector<uint8_t> spread_;   // a row of samples that pixels share
 };
 
 // Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,
@@ -75,7 +76,7 @@ class Filler {
 void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
                   const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]);
 // The same of some rows.
-void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
+void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
                   const Gain& gain, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]);
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <span>
+
+#include "core/passes/read_samples.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/grid.cpp"
@@ -87,6 +90,8 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const uint8_t* 
   }
 }
 
+int tallest_row(const Grid& grid) { return grid.height / grid.rows + 1; }
+
 // The row of cells that begins with row `top` of the picture.
 int row_at(const Grid& grid, int top) {
   return static_cast<int>((int64_t{top} * grid.rows + grid.height - 1) / grid.height);
@@ -98,12 +103,39 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
   means_of_rows(grid, 0, grid.rows, plane, 0, means);
 }
 
-void find_own_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
-                    GridFrames* cells, int frame) {
+// Of channels 1 and 2, a row of cells at a time.
+void find_shared_cells(const Grid& grid, const KeptPicture& picture, GridFrames* cells, int frame,
+                       uint8_t* room) {
+  const auto width = static_cast<size_t>(grid.width);
+  const size_t most = width * static_cast<size_t>(tallest_row(grid));
+  RowReader reader(picture, grid.width, room);
+  uint8_t* const block = room + 2 * width;
+  for (int row = 0; row < grid.rows; ++row) {
+    const int top = grid.top(row), bottom = grid.top(row + 1);
+    for (int y = top; y < bottom; ++y) {
+      const uint8_t* rows[kChannels];
+      reader.read(y, rows);
+      for (size_t c = 1; c < kChannels; ++c)
+        std::memcpy(block + (c - 1) * most + static_cast<size_t>(y - top) * width, rows[c], width);
+    }
+    for (int c = 1; c < kChannels; ++c)
+      means_of_rows(grid, row, row + 1, block + static_cast<size_t>(c - 1) * most, top,
+                    cells->plane(frame, c) + ptrdiff_t{row} * grid.cols);
+  }
+}
+
+size_t cells_room(const Grid& grid) {
+  return 2 * static_cast<size_t>(grid.width) * (1 + static_cast<size_t>(tallest_row(grid)));
+}
+
+void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
+                    GridFrames* cells, int frame, uint8_t* room) {
   const int first = row_at(grid, band.own_first()), end = row_at(grid, band.own_end());
-  for (int c = 0; c < kChannels; ++c)
-    means_of_rows(grid, first, end, planes[c], band.first(),
+  const bool shared = picture.shape.is_shared();
+  for (int c = 0; c < (shared ? 1 : kChannels); ++c)
+    means_of_rows(grid, first, end, picture.plane[c], band.first(),
                   cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
+  if (shared) find_shared_cells(grid, picture, cells, frame, room);
 }
 
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/gram/window.h"
 #include "core/parallel/band.h"
 
 namespace qdmd {
@@ -56,10 +57,12 @@ class GridFrames {
 // The mean of each cell of a plane of grid.width * grid.height samples.
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
-// The same of all planes of a picture into picture `frame` of `cells`, where `planes` have the
-// band's rows only: the cells of its own rows. Bands end where rows of cells do.
-void find_own_cells(const Grid& grid, const Band& band, const uint8_t* const planes[kChannels],
-                    GridFrames* cells, int frame);
+// The same of all channels of a picture into picture `frame` of `cells`, where the picture has the
+// band's rows only: the cells of its own rows. Bands end where rows of cells do, and their pictures
+// share no samples. room: where pixels share samples, as many bytes; else it may be null.
+void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
+                    GridFrames* cells, int frame, uint8_t* room = nullptr);
+size_t cells_room(const Grid& grid);
 // All members have the cells that each of them found, for good.
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame);
 

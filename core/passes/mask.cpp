@@ -100,6 +100,15 @@ HWY_EXPORT(pack_bits);
 // Samples that pack_bits() may read behind the last.
 constexpr size_t kBitsRead = 64;
 
+// Pixels whose bits are whole bytes, and whole vectors.
+constexpr size_t kBitsPacked = 64;
+
+// Rows of a mask that are packed together: they stay in the first-level cache.
+size_t mask_rows(size_t width, int height) {
+  constexpr size_t kMost = 16384;
+  return std::clamp<size_t>(kMost / width, 1, static_cast<size_t>(height));
+}
+
 constexpr int kMeanReach = 2, kMajorityReach = 3;  // pixels around one that judge it with it
 static_assert(kMeanReach + kMajorityReach == kMaskReach);
 
@@ -135,24 +144,26 @@ using CountRing = RowRing<uint8_t, kMajorityReach>;
 
 size_t mask_scratch_bytes(int width, int height) {
   const auto w = static_cast<size_t>(width);
-  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 3 * w +
-                       (w + 2 * kMajorityReach) + w * static_cast<size_t>(height) + kBitsRead;
+  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 5 * w +
+                       (w + 2 * kMajorityReach) + mask_rows(w, height) * w + kBitsPacked +
+                       kBitsRead;
   // The next thread's begins at an even address, too.
   return bytes + bytes % 2;
 }
 
-void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
                uint8_t* bits, uint8_t* scratch) noexcept {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
-  const size_t pixels = reference.pixels();
   const bool lit = is_lit(gain);
   const auto take = [&scratch](size_t bytes) { return std::exchange(scratch, scratch + bytes); };
   SumRing sums(reinterpret_cast<uint16_t*>(take(2 * width * SumRing::kRows)), width);
   CountRing counts(take(width * CountRing::kRows), width);
   uint8_t* const lit_rows[3] = {take(width), take(width), take(width)};
   uint8_t* const padded = take(width + 2 * kMajorityReach);
-  uint8_t* const mask = take(pixels + kBitsRead);
+  const size_t rows_together = mask_rows(width, height);
+  uint8_t* const mask = take(rows_together * width + kBitsPacked + kBitsRead);
+  RowReader reader(x, reference.width, take(2 * width));
 
   const auto add_norm = [&](int row) {
     const size_t start = static_cast<size_t>(row) * width;
@@ -163,7 +174,8 @@ void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], con
       HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, gain[c], lit_rows[c]);
       l[c] = lit_rows[c];
     }
-    const uint8_t* const row_of_x[3] = {x[0] + start, x[1] + start, x[2] + start};
+    const uint8_t* row_of_x[3];
+    reader.read(row, row_of_x);
     residual_norm(row_of_x, l, width, padded + kMeanReach);
     pad_ends(width, kMeanReach, padded);
     HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, sums.of(row));
@@ -176,41 +188,55 @@ void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], con
     HWY_DYNAMIC_DISPATCH(sum_seven_columns)(padded, width, counts.of(row));
   };
   int norms = 0, counted = 0;
+  size_t waiting = 0;  // pixels of the mask that are not packed yet, fewer than kBitsPacked of them
+                       // of rows before
   for (int row = 0; row < height; ++row) {
     for (; counted < std::min(height, row + kMajorityReach + 1); ++counted) {
       for (; norms < std::min(height, counted + kMeanReach + 1); ++norms) add_norm(norms);
       add_count(counted);
     }
     HWY_DYNAMIC_DISPATCH(most_row)
-    (counts.around(row, height).data(), width, mask + static_cast<size_t>(row) * width);
+    (counts.around(row, height).data(), width, mask + waiting);
+    waiting += width;
+    const bool last = row + 1 == height;
+    if (!last && (static_cast<size_t>(row) + 1) % rows_together != 0) continue;
+    const size_t packed = last ? waiting : waiting / kBitsPacked * kBitsPacked;
+    if (last) std::memset(mask + waiting, 0, kBitsRead);
+    HWY_DYNAMIC_DISPATCH(pack_bits)(mask, packed, bits);
+    bits += packed / 8;
+    waiting -= packed;
+    std::memmove(mask, mask + packed, waiting);
   }
-  std::memset(mask + pixels, 0, kBitsRead);
-  HWY_DYNAMIC_DISPATCH(pack_bits)(mask, pixels, bits);
 }
 
-GainSums gain_sums(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
                    const SampledRows& rows) {
   int64_t product[kChannels] = {}, square[kChannels] = {}, fit = 0, seen = 0;
-  for (int row = rows.first; row < rows.end; row += rows.step)
+  SampleFinder samples(x, reference.width);
+  for (int row = rows.first; row < rows.end; row += rows.step) {
+    samples.seek(row);
     for (int col = 0; col < reference.width; col += rows.step, ++seen) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +
                      static_cast<size_t>(col);
       float squared = 0;
       int brightest = 0;
+      uint8_t own[kChannels];
       for (size_t c = 0; c < 3; ++c) {
+        own[c] = samples.at(c, static_cast<size_t>(col));
         const float away =
-            static_cast<float>(x[c][p]) - static_cast<float>(reference.level[c][p]) * gain[c];
+            static_cast<float>(own[c]) - static_cast<float>(reference.level[c][p]) * gain[c];
         squared += away * away;
-        brightest = std::max<int>(brightest, x[c][p]);
+        brightest = std::max<int>(brightest, own[c]);
       }
       const float limit = reference.threshold[p];
       if (squared >= limit * limit || brightest >= 250) continue;
       ++fit;
       for (size_t c = 0; c < 3; ++c) {
-        product[c] += x[c][p] * reference.level[c][p];
+        product[c] += own[c] * reference.level[c][p];
         square[c] += reference.level[c][p] * reference.level[c][p];
       }
     }
+  }
   return {product[0], product[1], product[2], square[0], square[1], square[2], fit, seen};
 }
 

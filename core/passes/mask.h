@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -36,7 +37,7 @@ constexpr int kMaskReach = 5;
 // the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes.
 // scratch: mask_scratch_bytes() at an even address, which can serve many calls; threads run this,
 // so it takes no memory.
-void find_mask(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
                uint8_t* bits, uint8_t* scratch) noexcept;
 size_t mask_scratch_bytes(int width, int height);
 
@@ -51,7 +52,7 @@ Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], c
 constexpr int kGainRounds = 2;
 // Of each channel x times the reference, and the reference squared; pixels that fit; all.
 using GainSums = std::array<int64_t, 2 * kChannels + 2>;
-GainSums gain_sums(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
+GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
                    const SampledRows& rows);
 bool refine_gain(const GainSums& sums, Gain* gain);
 

@@ -90,8 +90,9 @@ void copy_row(const uint8_t* from, size_t count, uint8_t* to) {
 
 }  // namespace
 
-void median_block(const uint8_t* const* rows, const float* inverse, size_t count, size_t width,
-                  size_t height, size_t stride, uint8_t* const* background, uint8_t* spread) {
+void median_block(const uint8_t* const* rows, const size_t* strides, const float* inverse,
+                  size_t count, size_t width, size_t height, size_t stride,
+                  uint8_t* const* background, uint8_t* spread) {
   alignas(64) uint8_t samples[kChannels][kMost][kRun], sorted[kMost][kRun], median[kChannels][kRun];
   const size_t used = width * height, padded = (used + kUnit - 1) / kUnit * kUnit;
   const auto scatter = [&](const uint8_t* from, uint8_t* to) {
@@ -101,12 +102,13 @@ void median_block(const uint8_t* const* rows, const float* inverse, size_t count
   for (size_t c = 0; c < kChannels; ++c) {
     for (size_t i = 0; i < count; ++i) {
       const uint8_t* from = rows[kChannels * i + c];
+      const size_t step = strides[kChannels * i + c];
       uint8_t* to = samples[c][i];
       for (size_t y = 0; y < height; ++y) {
         // Cells that follow take mostly the same frames' next samples, too far apart for the
         // hardware to foresee.
-        hwy::Prefetch(from + y * stride + kUnit);
-        copy_row(from + y * stride, width, to + y * width);
+        hwy::Prefetch(from + y * step + kUnit);
+        copy_row(from + y * step, width, to + y * width);
       }
       std::memset(to + used, 0, padded - used);
       const float factor = inverse[kChannels * i + c];

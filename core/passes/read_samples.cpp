@@ -29,24 +29,29 @@ void spread_pixels(const ChromaShape& shape, const uint8_t* plane, size_t first,
 
 }  // namespace
 
-const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
-                            size_t count, uint8_t* room) {
-  const uint8_t* plane = snapshots.plane(index, channel);
-  if (channel == 0 || !snapshots.shape().is_shared()) return plane + first;
-  spread_pixels(snapshots.shape(), plane, first, count, room);
+const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int channel,
+                            size_t first, size_t count, uint8_t* room) {
+  if (channel == 0 || !shape.is_shared()) return plane + first;
+  spread_pixels(shape, plane, first, count, room);
   return room;
 }
 
-void read_planes(const PlaneSlots& frames, int slot, uint8_t* room, const uint8_t* planes[3]) {
-  for (int c = 0; c < kChannels; ++c) {
-    planes[c] = frames.plane(slot, c);
-    if (c == 0 || !frames.shape().is_shared()) continue;
-    uint8_t* const to = room + static_cast<size_t>(c - 1) * frames.pixels();
-    // Rows that share samples are alike.
-    const ChromaShape& shape = frames.shape();
-    const auto width = static_cast<size_t>(shape.width);
+const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
+                            size_t count, uint8_t* room) {
+  return read_samples(snapshots.shape(), snapshots.plane(index, channel), channel, first, count,
+                      room);
+}
+
+void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3]) {
+  std::copy_n(picture.plane, kChannels, planes);
+  const ChromaShape& shape = picture.shape;
+  if (!shape.is_shared()) return;
+  const auto width = static_cast<size_t>(shape.width);
+  for (size_t c = 1; c < kChannels; ++c) {
+    uint8_t* const to = room + (c - 1) * shape.pixels();
     for (int y = 0; y < shape.height; ++y) {
       uint8_t* const row = to + static_cast<size_t>(y) * width;
+      // Rows that share samples are alike.
       if (y % shape.rows != 0)
         std::memcpy(row, row - width, width);
       else
@@ -56,6 +61,23 @@ void read_planes(const PlaneSlots& frames, int slot, uint8_t* room, const uint8_
     }
     planes[c] = to;
   }
+}
+
+void RowReader::read(int y, const uint8_t* rows[3]) {
+  const ChromaShape& shape = picture_.shape;
+  for (size_t c = 0; c < kChannels; ++c)
+    rows[c] = picture_.plane[c] + static_cast<size_t>(y) * width_;
+  if (!shape.is_shared()) return;
+  const int shared = y / shape.rows;
+  for (size_t c = 1; c < kChannels; ++c) {
+    uint8_t* const row = room_ + (c - 1) * width_;
+    if (shared != spread_)
+      spread_samples(picture_.plane[c] +
+                         static_cast<size_t>(shared) * static_cast<size_t>(shape.chroma_width()),
+                     1, 2, width_, row);
+    rows[c] = row;
+  }
+  spread_ = shared;
 }
 
 }  // namespace qdmd

@@ -10,8 +10,57 @@ namespace qdmd {
 const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
                             size_t count, uint8_t* room);
 
-// The planes of the frame in a slot. Where pixels share samples, those of channels 1 and 2 are made
-// in `room`, which has space for 2 x pixels() samples; else it may be null.
-void read_planes(const PlaneSlots& frames, int slot, uint8_t* room, const uint8_t* planes[3]);
+// The same of a plane by itself.
+const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int channel,
+                            size_t first, size_t count, uint8_t* room);
+
+// The planes of a picture. Where pixels share samples, those of channels 1 and 2 are made in
+// `room`, which has room_for_planes() bytes; else it may be null.
+void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3]);
+inline size_t room_for_planes(const ChromaShape& shape) {
+  return shape.is_shared() ? (kChannels - 1) * shape.pixels() : 0;
+}
+
+// Reads rows of a picture, one after another.
+class RowReader {
+ public:
+  // room: where pixels share samples, space for 2 x width; else it may be null.
+  RowReader(const KeptPicture& picture, int width, uint8_t* room)
+      : picture_(picture), width_(static_cast<size_t>(width)), room_(room) {}
+
+  // Row y of the three channels. Good until the next call.
+  void read(int y, const uint8_t* rows[3]);
+
+ private:
+  const KeptPicture& picture_;
+  size_t width_;
+  uint8_t* room_;
+  int spread_ = -1;  // the row of shared samples that is in the room
+};
+
+// Where a sampled pixel's samples are in each row of a picture.
+class SampleFinder {
+ public:
+  SampleFinder(const KeptPicture& picture, int width)
+      : picture_(picture), width_(static_cast<size_t>(width)) {}
+
+  void seek(int row) {
+    const ChromaShape& shape = picture_.shape;
+    row_[0] = picture_.plane[0] + static_cast<size_t>(row) * width_;
+    for (int c = 1; c < kChannels; ++c)
+      row_[c] =
+          picture_.plane[c] + (shape.is_shared() ? static_cast<size_t>(row / shape.rows) *
+                                                       static_cast<size_t>(shape.chroma_width())
+                                                 : static_cast<size_t>(row) * width_);
+  }
+  uint8_t at(size_t c, size_t col) const {
+    return row_[c][c > 0 && picture_.shape.is_shared() ? col / 2 : col];
+  }
+
+ private:
+  const KeptPicture& picture_;
+  size_t width_;
+  const uint8_t* row_[kChannels] = {};
+};
 
 }  // namespace qdmd

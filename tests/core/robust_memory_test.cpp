@@ -15,7 +15,7 @@ namespace {
 
 struct Kept {
   explicit Kept(int capacity)
-      : grid(grid_of(2, 3)), memory(capacity, 6, grid), window(1, 6), cells(grid, 1) {
+      : grid(grid_of(2, 3)), memory(capacity, {2, 3}, grid), window(1, 6), cells(grid, 1) {
     window.append();
   }
   void keep(int64_t number, int64_t horizon = 1 << 30) {

@@ -43,7 +43,7 @@ TEST(SharedStore, HasAllThatBelongsToAFrame) {
         const int slot = shared.slot(t), other = plain.slot(t);
         std::vector<uint8_t> room(2 * plain.window().pixels());
         const uint8_t* planes[3];
-        read_planes(shared.window(), slot, room.data(), planes);
+        read_planes(shared.window().picture(slot), room.data(), planes);
         for (int c = 0; c < kChannels; ++c) {
           const size_t pixels = plain.window().pixels();
           ASSERT_TRUE(std::equal(planes[c], planes[c] + pixels, plain.window().plane(other, c)));

@@ -22,16 +22,29 @@ namespace allocator = qdmd::test::allocator;
 // Frames of few pixels, with the samples where the layout says and nothing around them.
 class Frame {
  public:
+  static constexpr int kShared = 3;  // layouts: planes, pixels of four bytes, grey, 4:2:0
   Frame(int width, int height, int layout) : width_(width), height_(height), layout_(layout) {
     const allocator::Unseen unseen;
     const auto pixels = static_cast<size_t>(width * height);
-    memory_.resize(layout == 0 ? 3 * pixels : layout == 1 ? 4 * pixels : pixels);
+    memory_.resize(layout == 0   ? 3 * pixels
+                   : layout == 1 ? 4 * pixels
+                   : layout == 2 ? pixels
+                                 : pixels + 2 * chroma());
   }
   template <typename Byte>
   BasicImageView<Byte> view() {
     BasicImageView<Byte> view;
     view.width = width_;
     view.height = height_;
+    if (layout_ == kShared) {
+      // 4:2:0.
+      for (int c = 0; c < 3; ++c) {
+        const size_t before = c == 0 ? 0 : static_cast<size_t>(width_ * height_);
+        view.channel[c] = memory_.data() + before + (c == 2 ? chroma() : 0);
+        view.own[c] = c == 0 ? Spacing{1, width_, 1, 1} : Spacing{1, (width_ + 1) / 2, 2, 2};
+      }
+      return view;
+    }
     const int step = layout_ == 1 ? 4 : 1;
     view.pixel_stride = step;
     view.row_stride = width_ * step;
@@ -45,6 +58,8 @@ class Frame {
   std::vector<uint8_t>& bytes() { return memory_; }
 
  private:
+  size_t chroma() const { return static_cast<size_t>((width_ + 1) / 2 * ((height_ + 1) / 2)); }
+
   int width_, height_, layout_;
   std::vector<uint8_t> memory_;
 };
@@ -95,6 +110,8 @@ EngineOptions any_options(fuzz::Bytes* bytes) {
   options.frame_rate = sane ? bytes->below(4) * 1000 : bytes->any_double();
   if (!sane && bytes->once_in(2)) options.max_memory = bytes->word();
   options.colours = static_cast<Colours>(bytes->below(3));
+  if (bytes->once_in(3)) options.chroma_columns = options.chroma_rows = 2;
+  if (!sane) options.chroma_rows = bytes->any_int();
   if (bytes->once_in(4)) {
     for (int c = 0; c < 3; ++c) {
       options.levels.black[c] = bytes->byte();
@@ -170,7 +187,11 @@ class EngineTrial {
     width_ = width, height_ = height;
     waiting_ = 0;
     const allocator::Unseen unseen;
-    frame_ = std::make_unique<Frame>(width, height, bytes_.below(3));
+    // Others than were said are refused.
+    const bool shared = options.chroma_columns == 2;
+    const int other = bytes_.below(4);
+    frame_ = std::make_unique<Frame>(width, height,
+                                     shared && !bytes_.once_in(8) ? Frame::kShared : other);
     QDMD_DEMAND(engine_.delay() >= 0);
   }
   void push() {

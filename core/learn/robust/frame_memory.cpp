@@ -1,11 +1,17 @@
 #include "core/learn/robust/frame_memory.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "core/passes/read_samples.h"
 
 namespace qdmd {
 
-FrameMemory::FrameMemory(int capacity, size_t pixels, const Grid& grid)
-    : capacity_(capacity), planes_(capacity, pixels), cells_(grid, capacity) {
+FrameMemory::FrameMemory(int capacity, const ChromaShape& shape, const Grid& grid)
+    : capacity_(capacity),
+      planes_(shape.is_shared() ? PlaneSlots(capacity, shape)
+                                : PlaneSlots(capacity, shape.pixels())),
+      cells_(grid, capacity) {
   kept_.reserve(static_cast<size_t>(capacity));
 }
 
@@ -35,6 +41,18 @@ int FrameMemory::free_slot() const {
   return slot;
 }
 
+void FrameMemory::unshare() {
+  PlaneSlots planes(capacity_, planes_.pixels());
+  std::vector<uint8_t> room(room_for_planes(planes_.shape()));
+  for (const Kept& kept : kept_) {
+    const uint8_t* own[3];
+    read_planes(planes_.picture(kept.slot), room.data(), own);
+    for (int c = 0; c < kChannels; ++c)
+      std::copy_n(own[c], planes_.pixels(), planes.plane(kept.slot, c));
+  }
+  planes_ = std::move(planes);
+}
+
 int FrameMemory::older_than(int64_t number) const {
   const auto newer = std::partition_point(kept_.begin(), kept_.end(),
                                           [number](Kept kept) { return kept.number < number; });
@@ -47,9 +65,12 @@ void FrameMemory::keep(int64_t number, const SnapshotRange& snapshots, int index
   while (!kept_.empty() && kept_.front().number < number - horizon) kept_.erase(kept_.begin());
   if (size() == capacity_)
     kept_.erase(kept_.begin() + static_cast<ptrdiff_t>(least_missed(number)));
+  if (planes_.shape().is_shared() && !snapshots.shape().is_shared()) unshare();
   const int free = free_slot();
   for (int c = 0; c < kChannels; ++c) {
-    std::copy_n(snapshots.plane(index, c), snapshots.pixels(), planes_.plane(free, c));
+    const size_t samples =
+        c > 0 && planes_.shape().is_shared() ? planes_.shape().samples() : snapshots.pixels();
+    std::copy_n(snapshots.plane(index, c), samples, planes_.plane(free, c));
     std::copy_n(cells.plane(snapshots.slot(index), c), cells.cells(), cells_.plane(free, c));
   }
   kept_.push_back({number, free});

@@ -15,7 +15,8 @@ class FrameMemory {
  public:
   FrameMemory() = default;
   // Takes all memory.
-  FrameMemory(int capacity, size_t pixels, const Grid& grid);
+  FrameMemory(int capacity, const ChromaShape& shape, const Grid& grid);
+  // With samples of its own for each pixel.
   static uint64_t bytes(int capacity, size_t pixels, const Grid& grid);
 
   void forget() { kept_.clear(); }
@@ -27,11 +28,14 @@ class FrameMemory {
   // How many frames have smaller numbers.
   int older_than(int64_t number) const;
   const uint8_t* plane(int index, int channel) const { return planes_.plane(slot(index), channel); }
+  // What planes share.
+  const ChromaShape& shape() const { return planes_.shape(); }
   const GridFrames& cells() const { return cells_; }
   int slot(int index) const { return kept_[static_cast<size_t>(index)].slot; }
 
   // Keeps a copy of frame `number`, which is newer than all others: snapshot `index` of `snapshots`
-  // with its cells. Frames older than `horizon` frames are forgotten.
+  // with its cells. Frames older than `horizon` frames are forgotten. If its pixels share no
+  // samples any more, those of all frames get their own: throws std::bad_alloc.
   void keep(int64_t number, const SnapshotRange& snapshots, int index, const GridFrames& cells,
             int64_t horizon);
 
@@ -42,6 +46,7 @@ class FrameMemory {
   };
   size_t least_missed(int64_t now) const;
   int free_slot() const;
+  void unshare();
 
   int capacity_ = 0;
   PlaneSlots planes_;

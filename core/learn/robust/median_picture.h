@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/base/channels.h"
+#include "core/gram/window.h"
 #include "core/learn/robust/stable_frames.h"
 #include "core/passes/median_block.h"
 
@@ -10,6 +11,7 @@ namespace qdmd {
 struct LitPicture {
   const uint8_t* plane[kChannels];
   Gain gain;
+  ChromaShape shape = {};  // of planes of shared samples; else nothing
 };
 
 // background[c][p]: the median over the frames of p's cell, in unit light; more than kMedianFrames

@@ -7,6 +7,7 @@
 
 #include "core/dmd/qdmd.h"
 #include "core/learn/robust/median_picture.h"
+#include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -149,7 +150,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   looks_ = StandingLooks(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
-  memory_ = FrameMemory(remembered_frames(room.window_size), pixels(), grid_);
+  memory_ = FrameMemory(remembered_frames(room.window_size), shape(), grid_);
   mask_ = WindowMask(snapshots, pixels());
   samples_ = Window(snapshots, samples_at(finest_step_));
   gram_ = SlidingGram(snapshots, room.pool);
@@ -290,13 +291,10 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
 void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& frames,
                             const Gain& light, BackgroundModel* model) {
   const auto count = static_cast<size_t>(frames.size());
-  const uint8_t* planes[kChannels * kMendingFrames];
   float inverse[kChannels * kMendingFrames];
+  const size_t strides[kChannels * kMendingFrames] = {};  // of blocks of one row
   for (size_t i = 0; i < count; ++i)
-    for (size_t c = 0; c < kChannels; ++c) {
-      planes[kChannels * i + c] = frames.plane(static_cast<int>(i), static_cast<int>(c));
-      inverse[kChannels * i + c] = 1 / light[c];
-    }
+    for (size_t c = 0; c < kChannels; ++c) inverse[kChannels * i + c] = 1 / light[c];
   const auto stride = static_cast<size_t>(grid_.width);
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;
@@ -307,10 +305,16 @@ void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& 
         const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
         const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
         const uint8_t* rows[kChannels * kMendingFrames];
-        for (size_t i = 0; i < kChannels * count; ++i) rows[i] = planes[i] + first;
+        uint8_t room[kChannels * kMendingFrames][kMedianBlock];
+        for (size_t i = 0; i < count; ++i)
+          for (size_t c = 0; c < kChannels; ++c) {
+            const size_t k = kChannels * i + c;
+            rows[k] = read_samples(frames, static_cast<int>(i), static_cast<int>(c), first, width,
+                                   room[k]);
+          }
         uint8_t level[kChannels][kMedianBlock], spread[kMedianBlock];
         uint8_t* const out[3] = {level[0], level[1], level[2]};
-        median_block(rows, inverse, count, width, 1, stride, out, spread);
+        median_block(rows, strides, inverse, count, width, 1, stride, out, spread);
         model->replace(first, width, out);
       }
     for (int c = 0; c < kChannels; ++c)
@@ -353,12 +357,14 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   for (int i = 0; i < old; ++i)
     choose(memory_.cells(), memory_.slot(i), i,
            {{memory_.plane(i, 0), memory_.plane(i, 1), memory_.plane(i, 2)},
-            light_over(memory_.cells(), memory_.slot(i), here, 0, &scratch)});
+            light_over(memory_.cells(), memory_.slot(i), here, 0, &scratch),
+            memory_.shape()});
   for (int i = 0; i < of_window; ++i) {
     const int t = static_cast<int>(int64_t{i} * m / of_window);
     choose(frames, t, old + i,
            {{snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
-            gains_[static_cast<size_t>(t)]});
+            gains_[static_cast<size_t>(t)],
+            snapshots.shape()});
   }
   Recollection recollection;
   if (earlier_.known()) {
@@ -426,9 +432,8 @@ void RobustLearner::find_foreground(const SnapshotRange& snapshots) {
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * room_.pool->threads());
   room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
     const int t = static_cast<int>(part);
-    const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                 snapshots.plane(t, 2)};
-    find_mask(reference_, x, gains_[part], mask_.of(t), scratch.get() + worker * scratch_size);
+    find_mask(reference_, snapshots.picture(t), gains_[part], mask_.of(t),
+              scratch.get() + worker * scratch_size);
   });
 }
 
@@ -439,11 +444,10 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
     while (samples_.size() < snapshots.size()) samples_.append();
     room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part) {
       const int t = static_cast<int>(part), slot = samples_.slot(t);
-      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                   snapshots.plane(t, 2)};
       uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                                samples_.plane(slot, 2)};
-      fill_samples(reference_, mask_.of(t), x, gains_[part], reach_.data(), sampled_rows(), out);
+      fill_samples(reference_, mask_.of(t), snapshots.picture(t), gains_[part], reach_.data(),
+                   sampled_rows(), out);
     });
     gram_.add_newest(samples_, samples_.size());
   }
@@ -503,10 +507,9 @@ void RobustLearner::refine_gains(const SnapshotRange& snapshots, const std::vect
   const auto gain_of = [&](size_t i) -> Gain& { return (*gains)[static_cast<size_t>(frames[i])]; };
   for (int round = 0; round < kGainRounds; ++round) {
     room_.pool->run(frames.size(), [&](size_t i) {
-      const int t = frames[i];
-      const uint8_t* const x[3] = {snapshots.plane(t, 0), snapshots.plane(t, 1),
-                                   snapshots.plane(t, 2)};
-      sums[i] = goes_on[i] ? gain_sums(reference_, x, gain_of(i), sampled_rows()) : GainSums{};
+      sums[i] = goes_on[i] ? gain_sums(reference_, snapshots.picture(frames[i]), gain_of(i),
+                                       sampled_rows())
+                           : GainSums{};
     });
     if (Team* team = band_.team(); team && !sums.empty())
       team->sum(Talk::light, {sums.front().data(), sums.size() * sums.front().size()});

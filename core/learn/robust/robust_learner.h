@@ -57,7 +57,12 @@ class RobustLearner : public Learner {
   static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
 
   FrameContents contents() const override {
-    return {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+    FrameContents contents = {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+    if (options_.keeps_shared()) {
+      contents.chroma_columns = options_.chroma_columns;
+      contents.chroma_rows = options_.chroma_rows;
+    }
+    return contents;
   }
   std::vector<int> sample_steps() const override;
   bool in_one_piece() const override { return true; }
@@ -93,6 +98,11 @@ class RobustLearner : public Learner {
 
  private:
   size_t pixels() const { return reference_.pixels(); }
+  // Of kept frames.
+  ChromaShape shape() const {
+    const FrameContents contents = this->contents();
+    return {reference_.width, reference_.height, contents.chroma_columns, contents.chroma_rows};
+  }
   size_t samples_at(int step) const;
   SampledRows sampled_rows() const;
   int remembered_frames(int window_size) const;
