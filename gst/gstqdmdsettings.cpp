@@ -51,8 +51,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_uint("window-size", "Window size",
                                 "Frames that are decomposed together; more frames separate slow "
-                                "movers better and cost memory (3 bytes per pixel and frame), time "
-                                "and, in mode=batch, latency",
+                                "movers better and cost memory (3 bytes per pixel and frame, 1.5 "
+                                "in 4:2:0), time and, in mode=batch, latency",
                                 guint(EngineOptions::kMinWindow), guint(EngineOptions::kMaxWindow),
                                 guint(d.engine.window_size), kAtStart);
      },

@@ -302,12 +302,12 @@ def resumed_with_other_options(folder):
 
 
 def memory_of_processes(folder):
-    width, height, frames = 1280, 721, 100
+    width, height, frames = 640, 481, 100
     clip = folder / 'large.mkv'
     make_clip(clip, frames, width, height)
     window = 3 * width * height * frames
     for method in ('qdmd', 'robust'):
-        for processes in (1, 2, 4) if LONG else (2,):
+        for processes in (1, 2, 3, 4) if LONG else (2,):
             most = {}
             for size in (2, frames):
                 run(folder, processes, clip, '--background', folder / 'm.png', '--window', size,

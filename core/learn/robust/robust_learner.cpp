@@ -366,6 +366,8 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
             gains_[static_cast<size_t>(t)],
             snapshots.shape()});
   }
+  // What follows takes as much once more.
+  frames = {};
   Recollection recollection;
   if (earlier_.known()) {
     pictures.emplace_back();
