@@ -117,8 +117,9 @@ class Job {
     int64_t first[] = {read};
     team_->tell(first);
     if (team_->agree(first[0] != read) != 0)
-      throw std::runtime_error("processes find another number of frames in the recording, this one " +
-                               std::to_string(read) + ": do all machines have the same files?");
+      throw std::runtime_error(
+          "processes find another number of frames in the recording, this one " +
+          std::to_string(read) + ": do all machines have the same files?");
   }
 
   void configure() {
