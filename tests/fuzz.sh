@@ -48,11 +48,12 @@ ninja -C "$build" "${wanted[@]}"
 export ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=${DETECT_LEAKS:-1} ${ASAN_OPTIONS:-}"
 export UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1 ${UBSAN_OPTIONS:-}"
 export LSAN_OPTIONS="suppressions=$PWD/tests/fuzz/lsan.supp:print_suppressions=0 ${LSAN_OPTIONS:-}"
+# Without entropic: its bookkeeping took two thirds of the time.
 for target in "${targets[@]}"; do
   echo "== $target: $runs runs"
   mkdir -p "$build/corpus/$target" "tests/fuzz/cases/$target"
   (cd "$build" && "tests/fuzz/fuzz-$target" -runs="$runs" -max_len=512 -timeout=30 -rss_limit_mb=4096 \
-    -print_final_stats=1 -verbosity=1 -close_fd_mask=1 \
+    -print_final_stats=1 -entropic=0 -verbosity=1 -close_fd_mask=1 \
     "corpus/$target" "../tests/fuzz/cases/$target" 2>"$target.log") || {
     tail -n 40 "$build/$target.log" >&2
     exit 1

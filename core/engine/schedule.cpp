@@ -25,7 +25,7 @@ bool Schedule::take(const ImageView& frame) {
   const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
   if (!pose.is_rest() && frames().shares_samples()) {
     wait();
-    no_room_ = !frames().unshare();
+    no_room_ = !frames().unshare(background().learner().bytes_to_unshare());
   }
   if (!pose.is_rest() && !no_room_)
     no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());

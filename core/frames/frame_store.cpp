@@ -158,9 +158,10 @@ const GridFrames& FrameStore::cells() const {
   return cells_;
 }
 
-bool FrameStore::unshare() {
-  const uint64_t more = PlaneSlots::bytes(capacity(), planes_.pixels());
+bool FrameStore::unshare(uint64_t beside) {
+  const uint64_t more = beside + PlaneSlots::bytes(capacity(), planes_.pixels());
   if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
+  most_bytes_ -= beside;
   Window window = planes_.unshared();
   std::vector<uint8_t> room(room_for_planes(planes_.shape()));
   for (int i = 0; i < planes_.size(); ++i) {

@@ -57,9 +57,10 @@ class FrameStore {
   // in `most_bytes`. Throws std::bad_alloc.
   bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
   // What moves shares no samples: before steady(), once, each pixel of all frames gets its own.
-  // Nobody reads frames then. False: there is no room. Throws std::bad_alloc.
+  // Nobody reads frames then. False: there is no room for that, and for `beside` bytes that others
+  // then take. Throws std::bad_alloc.
   bool shares_samples() const { return planes_.shape().is_shared(); }
-  bool unshare();
+  bool unshare(uint64_t beside);
   // Forgets all frames.
   void clear() { planes_.clear(); }
 

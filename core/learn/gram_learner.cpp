@@ -62,13 +62,16 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
       step_ == 1 && keeps_shared()
           ? ChromaShape{width_, height_, options_.chroma_columns, options_.chroma_rows}
           : ChromaShape{};
+  // One after the other: the decomposition, and pictures from chroma that is spread.
+  const uint64_t decomposition = options_.method == Method::dmd
+                                     ? channel_decomposition_bytes(dmd, window_size)
+                                     : decomposition_bytes(dmd, seen, window_size);
+  const uint64_t spread = keeps_shared() ? build_spread_bytes(window_size, threads) : 0;
+  const bool keeps_pictures = keeps_shared() || models == Models::two_of_live;
   return SlidingGram::bytes(capacity, threads, shape, deep ? 2 : 1) +
-         (options_.method == Method::dmd ? channel_decomposition_bytes(dmd, window_size)
-                                         : decomposition_bytes(dmd, seen, window_size)) +
+         std::max<uint64_t>(decomposition, spread) +
          (models == Models::one ? 1 : 2) *
-             BackgroundModel::bytes(pixels, window_size, pictures,
-                                    keeps_shared() || models == Models::two_of_live, deep) +
-         (keeps_shared() ? build_spread_bytes(window_size, threads) : 0);
+             BackgroundModel::bytes(pixels, window_size, pictures, keeps_pictures, deep);
 }
 
 bool GramLearner::may_read_frames(int window_size) const {

@@ -271,6 +271,8 @@ TEST(EngineStatus, MemoryNeedDoesNotWrapAround) {
                                          {2, kLongest, kLongest},
                                          {2048, kLongest, kLongest},
                                          {2048, kLongest, 32},
+                                         {2048, 1 << 24, 32},
+                                         {2048, 32, 1 << 24},
                                          {2, 1 << 18, 1 << 18},
                                          {2048, 32, kLongest}})
     for (Mode mode : {Mode::batch, Mode::live})
@@ -284,7 +286,8 @@ TEST(EngineStatus, MemoryNeedDoesNotWrapAround) {
             options.mask_softness = 3;
             options.max_memory = most;
             const Status status = check_options(options, width, height);
-            const bool too_many = uint64_t(width) * uint64_t(height) >= uint64_t{1} << 36;
+            const bool too_many = uint64_t(width) * uint64_t(height) >= uint64_t{1} << 36 ||
+                                  std::max(width, height) > 1 << 24;
             EXPECT_EQ(status.ok(), most == UINT64_MAX && !too_many)
                 << m << " " << width << "x" << height << ": " << status.message;
             if (status.ok()) continue;

@@ -28,6 +28,7 @@ struct Case {
   double rate = 0;  // frames per second: known, some come while a window is solved
   int softness = 0;
   int depth = 8;
+  bool shared = false;  // 4:2:0
 };
 
 EngineOptions options_of(const Case& c) {
@@ -40,6 +41,7 @@ EngineOptions options_of(const Case& c) {
   options.frame_rate = c.rate;
   options.mask_softness = c.softness;
   options.depth = c.depth;
+  if (c.shared) options.chroma_columns = options.chroma_rows = 2;
   return options;
 }
 
@@ -52,7 +54,8 @@ std::string describe(const Case& c) {
          std::to_string(c.height) + " window " + std::to_string(c.window) + ", " +
          std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)] +
          (c.rate > 0 ? ", solved beside" : "") + (c.softness > 0 ? ", soft" : "") +
-         (c.depth > 8 ? ", " + std::to_string(c.depth) + " bits" : "");
+         (c.depth > 8 ? ", " + std::to_string(c.depth) + " bits" : "") +
+         (c.shared ? ", 4:2:0" : "");
 }
 
 // The same picture in whole samples, whose low bits are noise.
@@ -66,6 +69,19 @@ PackedPicture deepened(const PackedPicture& from, int depth) {
     to.bytes[2 * i + 1] = static_cast<uint8_t>(sample >> 8);
   }
   return to;
+}
+// The first of the picture's bytes as planes of 4:2:0.
+ImageView shared_view(const PackedPicture& picture) {
+  ImageView view;
+  view.width = picture.width;
+  view.height = picture.height;
+  const ptrdiff_t along = (picture.width + 1) / 2, down = (picture.height + 1) / 2;
+  view.channel[0] = picture.bytes.data();
+  view.channel[1] = view.channel[0] + ptrdiff_t{picture.width} * picture.height;
+  view.channel[2] = view.channel[1] + along * down;
+  view.own[0] = {1, picture.width, 1, 1};
+  view.own[1] = view.own[2] = {1, along, 2, 2};
+  return view;
 }
 template <typename Byte>
 BasicImageView<Byte> deep_view(PackedPicture& picture, const Case& c) {
@@ -135,6 +151,8 @@ double run(const Case& c) {
       if (c.depth > 8) {
         deep = deepened(picture, c.depth);
         see([&] { status = engine.push(deep_view<const uint8_t>(deep, c)); });
+      } else if (c.shared) {
+        see([&] { status = engine.push(shared_view(picture)); });
       } else {
         see([&] { status = engine.push(picture.in()); });
       }
@@ -250,6 +268,19 @@ TEST(Memory, OfMoreThan8Bits) {
         c.method = method, c.mode = mode, c.alpha = alpha;
         c.width = 200, c.height = 150, c.window = 60, c.threads = 2;
         c.depth = alpha == Alpha::none ? 10 : 16;
+        check(c);
+      }
+}
+
+TEST(Memory, OfSharedChroma) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (Method method : {Method::robust, Method::qdmd, Method::dmd})
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (int threads : {1, 3}) {
+        Case c;
+        c.method = method, c.mode = mode, c.threads = threads;
+        c.width = 201, c.height = 151, c.window = 60;
+        c.shared = true;
         check(c);
       }
 }

@@ -15,8 +15,8 @@ FrameMemory::FrameMemory(int capacity, const ChromaShape& shape, const Grid& gri
   kept_.reserve(static_cast<size_t>(capacity));
 }
 
-uint64_t FrameMemory::bytes(int capacity, size_t pixels, const Grid& grid) {
-  return PlaneSlots::bytes(capacity, pixels) + GridFrames::bytes(grid, capacity) +
+uint64_t FrameMemory::bytes(int capacity, const ChromaShape& shape, const Grid& grid) {
+  return PlaneSlots::bytes(capacity, shape) + GridFrames::bytes(grid, capacity) +
          static_cast<uint64_t>(capacity) * sizeof(Kept);
 }
 

@@ -16,8 +16,11 @@ class FrameMemory {
   FrameMemory() = default;
   // Takes all memory.
   FrameMemory(int capacity, const ChromaShape& shape, const Grid& grid);
-  // With samples of its own for each pixel.
-  static uint64_t bytes(int capacity, size_t pixels, const Grid& grid);
+  static uint64_t bytes(int capacity, const ChromaShape& shape, const Grid& grid);
+  // Those that it takes more, for a moment, where pixels share no samples any more.
+  static uint64_t bytes_to_unshare(int capacity, const ChromaShape& shape) {
+    return shape.is_shared() ? PlaneSlots::bytes(capacity, shape.pixels()) : 0;
+  }
 
   void forget() { kept_.clear(); }
   int size() const { return static_cast<int>(kept_.size()); }

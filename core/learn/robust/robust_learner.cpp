@@ -101,7 +101,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       pictures + LightScratch::bytes(grid_.cells()) + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
       StableFrames::bytes(grid_, looks) + WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
-      SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, pixels(), grid_) +
+      SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, shape(), grid_) +
       StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
       static_cast<uint64_t>(window_size) * sizeof(Gain);
   // A scene that was left: levels and limits, and the same once more for windows to come. Where it
@@ -113,9 +113,9 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
        pixels());
   // One after another: what a start compares, with densities and then a spread; masks; the
   // decomposition; the combination.
-  const uint64_t start = GridFrames::bytes(grid_, snapshots + 1) +
-                         GridFrames::bytes(grid_, static_cast<int>(looks)) +
-                         std::max<uint64_t>(stable_frames_bytes(grid_, looks), pixels());
+  const uint64_t start = GridFrames::bytes(grid_, static_cast<int>(looks)) +
+                         std::max<uint64_t>({GridFrames::bytes(grid_, snapshots + 1),
+                                             stable_frames_bytes(grid_, looks), pixels()});
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
   return kept + made + scene +

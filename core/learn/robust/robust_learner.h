@@ -68,6 +68,9 @@ class RobustLearner : public Learner {
   bool in_one_piece() const override { return true; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
   bool may_read_frames(int) const override { return false; }
+  uint64_t bytes_to_unshare() const override {
+    return FrameMemory::bytes_to_unshare(remembered_frames(room_.window_size), shape());
+  }
   double solve_seconds(int window_size) const override;
   uint64_t solver_bytes(int window_size) const override;
 
