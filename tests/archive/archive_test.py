@@ -302,7 +302,7 @@ def resumed_with_other_options(folder):
 
 
 def memory_of_processes(folder):
-    width, height, frames = 640, 481, 100
+    width, height, frames = 1280, 721, 100
     clip = folder / 'large.mkv'
     make_clip(clip, frames, width, height)
     window = 3 * width * height * frames
