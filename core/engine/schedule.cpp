@@ -23,12 +23,10 @@ bool Schedule::take(const ImageView& frame) {
   const PlaneSlots& planes = frames().window();
   const int slot = frames().window().newest_slot(), channel = stabilizer->channel();
   const Pose pose = stabilizer->follow(planes.plane(slot, channel), ignored);
-  if (!pose.is_rest() && frames().shares_samples()) {
-    wait();
-    no_room_ = !frames().unshare(background().learner().bytes_to_unshare());
+  if (!pose.is_rest()) {
+    if (frames().shares_samples()) wait();
+    steady(frames().size() - 1, pose, idle_pool());
   }
-  if (!pose.is_rest() && !no_room_)
-    no_room_ = !frames().steady(frames().size() - 1, pose, &stabilizer->resampler(), idle_pool());
   if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
   return true;
 }
@@ -39,8 +37,13 @@ void Schedule::move_canvas(const Pose& to) {
   wait();
   for (int i = 0; i + 1 < frames().size() && !no_room_; ++i) {
     const Pose pose = compose(inverse(to), frames().pose(frames().slot(i)));
-    no_room_ = !frames().steady(i, pose, &stage_.stabilizer->resampler(), &workers().pool());
+    steady(i, pose, &workers().pool());
   }
+}
+
+void Schedule::steady(int index, const Pose& pose, Pool* pool) {
+  no_room_ = !frames().steady(index, pose, &stage_.stabilizer->resampler(), pool,
+                              background().learner().bytes_to_unshare());
 }
 
 }  // namespace qdmd

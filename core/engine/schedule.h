@@ -121,6 +121,7 @@ class Schedule {
 
  private:
   void move_canvas(const Pose& to);
+  void steady(int index, const Pose& pose, Pool* pool);
 
   Stage stage_;
   bool held_up_ = false, no_room_ = false;

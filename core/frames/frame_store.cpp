@@ -175,7 +175,9 @@ bool FrameStore::unshare(uint64_t beside) {
   return true;
 }
 
-bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool) {
+bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool* pool,
+                        uint64_t beside) {
+  if (shares_samples() && !unshare(beside)) return false;
   if (untouched_.capacity() == 0) {
     const uint64_t more = (low_bits_ > 0 ? 2 : 1) * PlaneSlots::bytes(capacity(), planes_.pixels());
     if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;

@@ -54,13 +54,11 @@ class FrameStore {
   // as they came stay in untouched(). Of more than 8 bits, moved planes have the highest 8, and
   // below them the middle of what there can be. What is outside of the frame is as in the frame
   // before, or, where there is none, as in this one. False, and nothing is done: there is no room
-  // in `most_bytes`. Throws std::bad_alloc.
-  bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool);
-  // What moves shares no samples: before steady(), once, each pixel of all frames gets its own.
-  // Nobody reads frames then. False: there is no room for that, and for `beside` bytes that others
-  // then take. Throws std::bad_alloc.
+  // in `most_bytes`, for that and for `beside` bytes that others take then. Where pixels share
+  // samples, those of all frames get their own first, for good. Throws std::bad_alloc.
+  bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool, uint64_t beside = 0);
+  // Pixels share samples: nobody may read frames while the first one is moved.
   bool shares_samples() const { return planes_.shape().is_shared(); }
-  bool unshare(uint64_t beside);
   // Forgets all frames.
   void clear() { planes_.clear(); }
 
@@ -120,6 +118,7 @@ class FrameStore {
   void take_deep_planes(int slot, const ImageView& frame);
   bool take_deep_alpha(int slot, const ImageView& frame);
   bool make_alpha();
+  bool unshare(uint64_t beside);
   void keep_low_of_moved(int slot, const Pose& pose, bool was_moved);
 
   Band band_;

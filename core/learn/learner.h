@@ -74,7 +74,7 @@ class Learner {
   // True where a model may read its window's frames as long as it is in use, Models::two_of_live
   // aside.
   virtual bool may_read_frames(int window_size) const = 0;
-  // Bytes more where the store's frames come to share no samples (FrameStore::unshare()).
+  // Bytes more where the store's frames come to share no samples (FrameStore::steady()).
   virtual uint64_t bytes_to_unshare() const { return 0; }
   // Estimate of the seconds of a solve, with two threads of a machine of 2024.
   virtual double solve_seconds(int window_size) const = 0;

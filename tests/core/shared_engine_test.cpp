@@ -42,9 +42,9 @@ struct Scene {
 constexpr Output kOutputs[] = {Output::background, Output::foreground, Output::mask,
                                Output::cutout};
 
-// All that leaves, of the four outputs in turn.
+// All that leaves, of the four outputs in turn. moved: frames that the camera was found elsewhere.
 std::vector<std::vector<uint8_t>> run(const EngineOptions& options, const VideoLayout& layout,
-                                      const Scene& scene, int frames) {
+                                      const Scene& scene, int frames, int* moved) {
   Engine engine;
   EXPECT_TRUE(engine.configure(options, scene.width, scene.height).ok());
   VideoPicture in(layout, scene.width, scene.height, 3);
@@ -61,6 +61,7 @@ std::vector<std::vector<uint8_t>> run(const EngineOptions& options, const VideoL
   for (int t = 0; t < frames; ++t) {
     scene.paint(t, &in);
     EXPECT_TRUE(engine.push(in.view<const uint8_t>()).ok());
+    *moved += !engine.newest_pose().is_rest();
     pop_all();
   }
   EXPECT_TRUE(engine.drain().ok());
@@ -80,17 +81,24 @@ EngineOptions options_of(Method method, Mode mode) {
   return options;
 }
 
-void expect_the_same(EngineOptions options, const VideoLayout& layout, const Scene& scene,
-                     int frames = 30) {
+// Returns how many frames were moved.
+int expect_the_same(EngineOptions options, const VideoLayout& layout, const Scene& scene,
+                    int frames = 30) {
   SCOPED_TRACE(std::string(layout.name) + " " + std::to_string(scene.width) + "x" +
                std::to_string(scene.height) + ", method " +
                std::to_string(static_cast<int>(options.method)) + ", mode " +
                std::to_string(static_cast<int>(options.mode)));
-  const auto plain = run(options, layout, scene, frames);
+  int moved = 0, moved_too = 0;
+  const auto plain = run(options, layout, scene, frames, &moved);
   options.chroma_columns = layout.at[1].columns;
   options.chroma_rows = layout.at[1].rows;
-  const auto shared = run(options, layout, scene, frames);
-  for (size_t i = 0; i < plain.size(); ++i) ASSERT_EQ(plain[i], shared[i]) << "picture " << i;
+  const auto shared = run(options, layout, scene, frames, &moved_too);
+  EXPECT_EQ(moved, moved_too);
+  for (size_t i = 0; i < plain.size(); ++i) {
+    EXPECT_EQ(plain[i], shared[i]) << "picture " << i;
+    if (plain[i] != shared[i]) break;
+  }
+  return moved;
 }
 
 TEST(SharedEngine, EveryLayout) {
@@ -140,7 +148,7 @@ TEST(SharedEngine, CameraIsPushed) {
     for (Mode mode : {Mode::batch, Mode::live}) {
       EngineOptions options = options_of(method, mode);
       options.stabilize = Stabilize::translation;
-      expect_the_same(options, kVideoLayouts[0], {320, 160, false, 17}, 60);
+      EXPECT_GT(expect_the_same(options, kVideoLayouts[0], {320, 160, false, 17}, 60), 0);
     }
 }
 

@@ -159,6 +159,50 @@ TEST(SharedStore, LearnersFindTheSameBackground) {
         }
 }
 
+// What moves has its own samples from then on, and so have all other frames.
+TEST(SharedStore, FramesThatMoveGetTheirOwnSamples) {
+  constexpr int kWidth = 67, kHeight = 43;
+  const VideoLayout& layout = kVideoLayouts[0];
+  const FrameContents contents = {1, 4, 2, 2};
+  const uint64_t bytes = FrameStore::bytes(3, kWidth, kHeight, contents);
+  FrameStore shared(3, kWidth, kHeight, contents), plain(3, kWidth, kHeight, {1, 4}),
+      narrow(3, kWidth, kHeight, contents, bytes);
+  const auto append = [&] {
+    VideoPicture frame(layout, kWidth, kHeight, 0);
+    frame.fill_randomly(rng);
+    for (FrameStore* store : {&shared, &plain, &narrow})
+      ASSERT_TRUE(store->append(frame.view<const uint8_t>()));
+  };
+  // The ring begins anywhere.
+  for (int t = 0; t < 4; ++t) append();
+  Pool pool(1);
+  Resampler resampler;
+  Pose pose;
+  pose.x = 2.5;
+  for (int index : {0, 2}) {
+    ASSERT_TRUE(shared.steady(index, pose, &resampler, &pool));
+    ASSERT_TRUE(plain.steady(index, pose, &resampler, &pool));
+  }
+  append();
+  EXPECT_FALSE(shared.shares_samples());
+  for (int t = 0; t < 3; ++t) {
+    const int slot = shared.slot(t);
+    ASSERT_EQ(slot, plain.slot(t));
+    EXPECT_EQ(shared.pose(slot).x, plain.pose(slot).x);
+    for (int c = 0; c < kChannels; ++c) {
+      const size_t pixels = plain.window().pixels(), cells = plain.cells().cells();
+      const uint8_t* const plane = shared.window().plane(slot, c);
+      EXPECT_TRUE(std::equal(plane, plane + pixels, plain.window().plane(slot, c)));
+      const float* const means = shared.cells().plane(slot, c);
+      EXPECT_TRUE(std::equal(means, means + cells, plain.cells().plane(slot, c)));
+    }
+  }
+  // No room: nothing is done.
+  EXPECT_FALSE(narrow.steady(0, pose, &resampler, &pool));
+  EXPECT_TRUE(narrow.shares_samples());
+  EXPECT_EQ(narrow.bytes(), bytes);
+}
+
 TEST(SharedStore, TakesHalfOfTheMemory) {
   const auto bytes = [](const FrameContents& contents) {
     return static_cast<double>(FrameStore::bytes(100, 1920, 1080, contents));

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "tests/core/engine_util.h"
@@ -13,6 +14,12 @@ namespace qdmd::test {
 namespace {
 
 constexpr Levels kVideoLevels = {{16, 128, 128}, {235, 128, 128}};
+
+TEST(SoftMask, BytesOfTheLongestRowDoNotOverflow) {
+  constexpr uint64_t kLongest = std::numeric_limits<int>::max();
+  EXPECT_EQ(SoftMask::bytes(static_cast<int>(kLongest), 1),
+            3 * kLongest + (kLongest + kSoftTile - 1) / kSoftTile);
+}
 
 // ---- The filter ----
 
