@@ -51,35 +51,33 @@ Learnt any_learnt(fuzz::Bytes* bytes) {
 }
 
 // What was read suits an engine of its size, or is refused by it, and is written as it was read.
-void use(const Learnt& learnt, const Bytes& file) {
+void use(Method method, const Learnt& learnt, const Bytes& file) {
   QDMD_DEMAND(pack(learnt) == file);
   if (int64_t{learnt.width} * learnt.height > 64) return;
-  for (Method method : {Method::robust, Method::qdmd}) {
-    EngineOptions options;
-    options.mode = Mode::live;
-    options.window_size = 3;
-    options.threads = 1;
-    options.method = method;
-    options.colours = learnt.colours;
-    Engine engine;
-    QDMD_DEMAND(engine.configure(options, learnt.width, learnt.height).ok());
-    if (!engine.learn_from(learnt).ok()) continue;
-    const auto pixels = static_cast<size_t>(learnt.width * learnt.height);
-    Bytes frame(3 * pixels, 77), out(3 * pixels);
-    ImageView in;
-    MutableImageView picture;
-    for (size_t c = 0; c < 3; ++c) {
-      in.channel[c] = frame.data() + c * pixels;
-      picture.channel[c] = out.data() + c * pixels;
-    }
-    in.width = picture.width = learnt.width;
-    in.height = picture.height = learnt.height;
-    in.pixel_stride = picture.pixel_stride = 1;
-    in.row_stride = picture.row_stride = learnt.width;
-    for (int t = 0; t < 4; ++t) {
-      QDMD_DEMAND(engine.push(in).ok());
-      engine.pop(t % 2 ? Output::mask : Output::background, picture);
-    }
+  EngineOptions options;
+  options.mode = Mode::live;
+  options.window_size = 3;
+  options.threads = 1;
+  options.method = method;
+  options.colours = learnt.colours;
+  Engine engine;
+  QDMD_DEMAND(engine.configure(options, learnt.width, learnt.height).ok());
+  if (!engine.learn_from(learnt).ok()) return;
+  const auto pixels = static_cast<size_t>(learnt.width * learnt.height);
+  Bytes frame(3 * pixels, 77), out(3 * pixels);
+  ImageView in;
+  MutableImageView picture;
+  for (size_t c = 0; c < 3; ++c) {
+    in.channel[c] = frame.data() + c * pixels;
+    picture.channel[c] = out.data() + c * pixels;
+  }
+  in.width = picture.width = learnt.width;
+  in.height = picture.height = learnt.height;
+  in.pixel_stride = picture.pixel_stride = 1;
+  in.row_stride = picture.row_stride = learnt.width;
+  for (int t = 0; t < 4; ++t) {
+    QDMD_DEMAND(engine.push(in).ok());
+    engine.pop(t % 2 ? Output::mask : Output::background, picture);
   }
 }
 
@@ -111,7 +109,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   learnt.width = -5;
   const Status status = unpack(file, &learnt);
   if (status.ok()) {
-    use(learnt, file);
+    use(static_cast<Method>(bytes.below(3)), learnt, file);
   } else {
     QDMD_DEMAND(status.code == Status::Code::bad_file && !status.message.empty());
     QDMD_DEMAND(learnt.width == -5);
