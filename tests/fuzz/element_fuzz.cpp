@@ -12,30 +12,24 @@
 #include "tests/core/allocator.h"
 #include "tests/fuzz/bytes.h"
 #include "tests/fuzz/expect.h"
+#include "tests/fuzz/outlet.h"
 
 namespace {
 
 namespace allocator = qdmd::test::allocator;
 using qdmd::fuzz::Bytes;
+using qdmd::fuzz::Outlet;
 
+// The ordinary ones first, as many as kOrdinary; then deep ones, and some that it does not take.
+constexpr int kOrdinary = 23;
 const char* const kFormats[] = {
-    "RGB",  "RGBx", "BGRx",  "xRGB", "xBGR",      "RGBA", "BGRA",      "ARGB",   "ABGR", "BGR",
-    "GBR",  "I420", "YV12",  "NV12", "NV21",      "Y42B", "NV16",      "YUY2",   "UYVY", "Y444",
-    "AYUV", "A420", "GRAY8", "GBRA", "P010_10LE", "v210", "GRAY16_LE", "ENCODED"};
+    "RGB",       "RGBx",      "BGRx",      "xRGB",      "xBGR",      "RGBA",      "BGRA",
+    "ARGB",      "ABGR",      "BGR",       "GBR",       "I420",      "YV12",      "NV12",
+    "NV21",      "Y42B",      "NV16",      "YUY2",      "UYVY",      "Y444",      "AYUV",
+    "A420",      "GRAY8",     "GBRA",      "P010_10LE", "v210",      "GRAY16_LE", "ENCODED",
+    "I420_10LE", "I422_10LE", "Y444_10LE", "I420_12LE", "I422_12LE", "Y444_12LE", "P012_LE",
+    "Y444_16LE", "P016_LE",   "RGBA64_LE", "ARGB64"};
 const char* const kPads[] = {"mask", "cutout", "background", "foreground"};
-
-class ElementTrial;
-
-// One sink behind a source pad.
-struct Outlet {
-  ElementTrial* trial = nullptr;
-  GstPad *source = nullptr, *sink = nullptr;
-  GstFlowReturn flow = GST_FLOW_OK;
-  GstCaps* taken = nullptr;  // null: any
-  bool has_caps = false, requested = false, pool = false;
-  GstVideoInfo info = {};
-  gint64 last = -1;  // number of the last frame
-};
 
 class ElementTrial {
  public:
@@ -59,7 +53,7 @@ class ElementTrial {
       open(bytes_.below(4));
       if (bytes_.once_in(2)) open(bytes_.below(4));
     } else {
-      connect(0, gst_element_get_static_pad(element_, "src"), false);
+      outlets_[0].connect(gst_element_get_static_pad(element_, "src"), &number_);
     }
   }
 
@@ -91,7 +85,7 @@ class ElementTrial {
     set_state(GST_STATE_NULL);
     gst_pad_set_active(source_, FALSE);
     gst_pad_unlink(source_, sink_);
-    for (Outlet& outlet : outlets_) disconnect(&outlet);
+    for (Outlet& outlet : outlets_) outlet.disconnect();
     gst_element_set_bus(element_, nullptr);
     gst_object_unref(bus_);
     gst_object_unref(source_);
@@ -104,103 +98,14 @@ class ElementTrial {
  private:
   // ---- Pads ----
 
-  void connect(size_t i, GstPad* source, bool requested) {
-    Outlet& outlet = outlets_[i];
-    outlet.trial = this;
-    outlet.source = source;
-    outlet.requested = requested;
-    // Without a template it would take the caps that it has, and no others.
-    GstCaps* any = gst_caps_new_any();
-    GstPadTemplate* takes_any = gst_pad_template_new("down", GST_PAD_SINK, GST_PAD_ALWAYS, any);
-    gst_caps_unref(any);
-    outlet.sink = gst_pad_new_from_template(takes_any, "down");
-    gst_object_unref(takes_any);
-    gst_object_ref_sink(outlet.sink);
-    gst_pad_set_element_private(outlet.sink, &outlet);
-    gst_pad_set_chain_function(outlet.sink, take);
-    gst_pad_set_event_function(outlet.sink, hear);
-    gst_pad_set_query_function(outlet.sink, answer_downstream);
-    gst_pad_set_active(outlet.sink, TRUE);
-    // It fails where upstream has nothing that downstream takes.
-    gst_pad_link(source, outlet.sink);
-  }
   void open(int i) {
-    if (!many_ || outlets_[i].source) return;
+    if (!many_ || outlets_[i].connected()) return;
     GstPad* source = gst_element_request_pad_simple(element_, kPads[i]);
-    if (source) connect(size_t(i), source, true);
-  }
-  void disconnect(Outlet* outlet) {
-    if (!outlet->source) return;
-    gst_pad_set_active(outlet->sink, FALSE);
-    gst_pad_unlink(outlet->source, outlet->sink);
-    if (outlet->requested) gst_element_release_request_pad(element_, outlet->source);
-    gst_object_unref(outlet->source);
-    gst_object_unref(outlet->sink);
-    gst_clear_caps(&outlet->taken);
-    *outlet = Outlet();
+    if (source) outlets_[i].connect(source, &number_);
   }
   Outlet* some_outlet() {
     Outlet& outlet = outlets_[many_ ? bytes_.below(4) : 0];
-    return outlet.source ? &outlet : nullptr;
-  }
-
-  static Outlet* outlet_of(GstPad* pad) {
-    return static_cast<Outlet*>(gst_pad_get_element_private(pad));
-  }
-  // What arrives is a frame of its caps, and comes after the one before.
-  static GstFlowReturn take(GstPad* pad, GstObject*, GstBuffer* buffer) {
-    const allocator::Unseen unseen;
-    Outlet* outlet = outlet_of(pad);
-    QDMD_DEMAND(outlet->has_caps);
-    GstVideoFrame frame;
-    QDMD_DEMAND(gst_video_frame_map(&frame, &outlet->info, buffer, GST_MAP_READ));
-    // All of it was written, and is there.
-    unsigned sum = 0;
-    for (guint plane = 0; plane < GST_VIDEO_FRAME_N_PLANES(&frame); ++plane)
-      sum += *static_cast<const guint8*>(GST_VIDEO_FRAME_PLANE_DATA(&frame, plane));
-    QDMD_DEMAND(sum <= 4 * 255);
-    gst_video_frame_unmap(&frame);
-    const auto number = gint64(GST_BUFFER_OFFSET(buffer));
-    QDMD_DEMAND(number > outlet->last && number < outlet->trial->number_);
-    outlet->last = number;
-    gst_buffer_unref(buffer);
-    return outlet->flow;
-  }
-  static gboolean hear(GstPad* pad, GstObject*, GstEvent* event) {
-    const allocator::Unseen unseen;
-    Outlet* outlet = outlet_of(pad);
-    if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-      GstCaps* caps = nullptr;
-      gst_event_parse_caps(event, &caps);
-      QDMD_DEMAND(gst_video_info_from_caps(&outlet->info, caps));
-      outlet->has_caps = true;
-    }
-    gst_event_unref(event);
-    return TRUE;
-  }
-  static gboolean answer_downstream(GstPad* pad, GstObject* parent, GstQuery* query) {
-    Outlet* outlet = outlet_of(pad);
-    if (GST_QUERY_TYPE(query) == GST_QUERY_CAPS && outlet->taken) {
-      GstCaps* filter = nullptr;
-      gst_query_parse_caps(query, &filter);
-      GstCaps* caps =
-          filter ? gst_caps_intersect(filter, outlet->taken) : gst_caps_ref(outlet->taken);
-      gst_query_set_caps_result(query, caps);
-      gst_caps_unref(caps);
-      return TRUE;
-    }
-    if (GST_QUERY_TYPE(query) == GST_QUERY_ALLOCATION && outlet->pool) {
-      GstCaps* caps = nullptr;
-      gst_query_parse_allocation(query, &caps, nullptr);
-      GstVideoInfo info;
-      if (!caps || !gst_video_info_from_caps(&info, caps)) return FALSE;
-      GstBufferPool* pool = gst_video_buffer_pool_new();
-      gst_query_add_allocation_pool(query, pool, guint(info.size), 0, 0);
-      gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr);
-      gst_object_unref(pool);
-      return TRUE;
-    }
-    return gst_pad_query_default(pad, parent, query);
+    return outlet.connected() ? &outlet : nullptr;
   }
   static gboolean answer_upstream(GstPad* pad, GstObject* parent, GstQuery* query) {
     if (GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
@@ -218,14 +123,15 @@ class ElementTrial {
   void set_state(GstState state) {
     gst_element_set_state(element_, state);
     if (state <= GST_STATE_READY)
-      for (Outlet& outlet : outlets_) outlet.has_caps = false;
+      for (Outlet& outlet : outlets_) outlet.forget_caps();
   }
   void push_event(GstEvent* event) {
     // A new stream counts anew for nobody: numbers go on.
     gst_pad_push_event(source_, event);
   }
   GstCaps* any_caps() {
-    const char* format = kFormats[bytes_.below(bytes_.once_in(8) ? std::size(kFormats) : 23)];
+    const char* format =
+        kFormats[bytes_.below(bytes_.once_in(4) ? int{std::size(kFormats)} : kOrdinary)];
     const bool any = bytes_.once_in(12);
     const int width = any ? bytes_.any_int() : bytes_.from(1, 17);
     const int height = any ? bytes_.any_int() : bytes_.from(1, 17);
@@ -390,7 +296,7 @@ class ElementTrial {
           default:
             event = gst_event_new_latency(bytes_.word());
         }
-        gst_pad_push_event(outlet->sink, event);
+        outlet->push_event(event);
       }
     }
   }
@@ -436,7 +342,7 @@ class ElementTrial {
         GST_QUERY_TYPE(query) == GST_QUERY_DRAIN)
       gst_pad_peer_query(source_, query);
     else
-      gst_pad_peer_query(outlet->sink, query);
+      outlet->ask(query);
     gst_query_unref(query);
   }
 
@@ -545,7 +451,7 @@ class ElementTrial {
           static const GstFlowReturn flows[] = {
               GST_FLOW_OK,    GST_FLOW_OK,         GST_FLOW_EOS,           GST_FLOW_FLUSHING,
               GST_FLOW_ERROR, GST_FLOW_NOT_LINKED, GST_FLOW_NOT_NEGOTIATED};
-          outlet->flow = flows[bytes_.below(7)];
+          outlet->answer_with(flows[bytes_.below(7)]);
         }
         break;
       case 10:
@@ -555,7 +461,7 @@ class ElementTrial {
         if (bytes_.once_in(2))
           open(bytes_.below(4));
         else if (many_)
-          disconnect(&outlets_[bytes_.below(4)]);
+          outlets_[bytes_.below(4)].disconnect();
         break;
       case 12:
         if (Outlet* outlet = some_outlet()) {
@@ -563,12 +469,9 @@ class ElementTrial {
           if (caps && bytes_.once_in(2)) {
             gst_caps_unref(caps);
             caps = gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
-                                       kFormats[bytes_.below(23)], nullptr);
+                                       kFormats[bytes_.below(kOrdinary)], nullptr);
           }
-          gst_clear_caps(&outlet->taken);
-          outlet->taken = caps;
-          outlet->pool = bytes_.once_in(2);
-          gst_pad_push_event(outlet->sink, gst_event_new_reconfigure());
+          outlet->take_only(caps, bytes_.once_in(2));
         }
         break;
       case 13:
