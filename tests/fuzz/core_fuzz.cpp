@@ -100,7 +100,8 @@ EngineOptions any_options(fuzz::Bytes* bytes) {
   options.dmd.rank = sane ? bytes->below(5) : bytes->any_int();
   options.dmd.solver = static_cast<Solver>(bytes->below(5));
   options.dmd.amplitude = static_cast<Amplitude>(bytes->below(2));
-  options.dmd.estimator = static_cast<Estimator>(bytes->below(4));
+  // The others take many times as long.
+  if (bytes->once_in(4)) options.dmd.estimator = static_cast<Estimator>(bytes->below(4));
   options.dmd.spectrum = bytes->once_in(2);
   options.dmd.omega_threshold = sane ? bytes->byte() / 64.0 : bytes->any_double();
   options.foreground_threshold = sane ? bytes->byte() / 4.0 : bytes->any_double();
@@ -141,7 +142,7 @@ class EngineTrial {
 
   void run() {
     configure();
-    for (int calls = 0; calls < 48 && !bytes_.empty(); ++calls) {
+    for (int calls = 0; calls < 32 && !bytes_.empty(); ++calls) {
       const bool failing = bytes_.once_in(16);
       if (failing) {
         failed_ = true;
