@@ -3,7 +3,7 @@
 # nothing when all are there.
 #
 #   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
-#                                               fuzz, tidy, coverage
+#                                               fuzz, tidy, coverage, neon
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -29,6 +29,8 @@ opencv=(python3-numpy python3-opencv)
 fuzz=(clang)
 tidy=(clang-tidy)
 coverage=(gcovr)
+# The compiler for 64-bit ARM, its C library, and what runs its programs.
+neon=(make g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
 
 wanted=()
 for group in "$@"; do
@@ -42,7 +44,8 @@ for group in "$@"; do
     fuzz) wanted+=("${fuzz[@]}") ;;
     tidy) wanted+=("${tidy[@]}") ;;
     coverage) wanted+=("${coverage[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage)" >&2; exit 2 ;;
+    neon) wanted+=("${neon[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon)" >&2; exit 2 ;;
   esac
 done
 
