@@ -324,12 +324,17 @@ class EngineTrial {
     QDMD_DEMAND(unpack(pack(learnt), &read).ok());
     learnt_ = std::move(read);
   }
-  // All that waits leaves.
+  // All that waits leaves, or is gone where there was no memory for its solve.
   void finish() {
     if (!engine_.configured()) return;
-    while (engine_.ready()) pop();
-    QDMD_DEMAND(engine_.drain().ok());
-    while (engine_.ready()) pop();
+    try {
+      while (engine_.ready()) pop();
+      QDMD_DEMAND(engine_.drain().ok());
+      while (engine_.ready()) pop();
+    } catch (const std::bad_alloc&) {
+      QDMD_DEMAND(failed_);
+      waiting_ = 0;
+    }
     QDMD_DEMAND(waiting_ == 0 && engine_.pending() == 0);
   }
 
