@@ -27,6 +27,23 @@ __attribute__((visibility("default"))) void g_mutex_unlock(GMutex* mutex) {
   __tsan_release(mutex);
   real(mutex);
 }
+// Those of a pad's stream: what held one before has ended what it did.
+__attribute__((visibility("default"))) void g_rec_mutex_lock(GRecMutex* mutex) {
+  REAL(g_rec_mutex_lock);
+  real(mutex);
+  __tsan_acquire(mutex);
+}
+__attribute__((visibility("default"))) gboolean g_rec_mutex_trylock(GRecMutex* mutex) {
+  REAL(g_rec_mutex_trylock);
+  const gboolean locked = real(mutex);
+  if (locked) __tsan_acquire(mutex);
+  return locked;
+}
+__attribute__((visibility("default"))) void g_rec_mutex_unlock(GRecMutex* mutex) {
+  REAL(g_rec_mutex_unlock);
+  __tsan_release(mutex);
+  real(mutex);
+}
 __attribute__((visibility("default"))) void g_cond_wait(GCond* cond, GMutex* mutex) {
   REAL(g_cond_wait);
   __tsan_release(mutex);
