@@ -2,9 +2,10 @@
 // memory, file descriptors and threads stay as they are, and no frame is lost or changes places.
 //
 //   soak                  the short form: some seconds
-//   soak --long           1 million frames of 160x120 live and as many in batch, 1,000 state
-//   cycles,
-//                         1,000 changes of caps, 200 elements and 16 pipelines at once
+//   soak --long           1 million frames of 160x120 live and as many in batch, 1,000 cycles of
+//                         states, 1,000 changes of caps, 200 elements and 16 pipelines at once
+#include <malloc.h>
+
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -34,12 +35,14 @@ constexpr const char* kKinds[] = {
     "qdmdseparate mode=live window-size=20 n-threads=1",
 };
 
-// What the process has.
+// What the process has. Memory that is free again counts only where the system cannot have it back:
+// how much of it the allocator keeps changes with the turns that threads take.
 struct Held {
   long kilobytes = 0, files = 0, threads = 0;
 };
 Held held() {
   Held now;
+  malloc_trim(0);
   std::ifstream pages("/proc/self/statm");
   long all = 0, resident = 0;
   pages >> all >> resident;
@@ -50,7 +53,7 @@ Held held() {
   return now;
 }
 
-// What the allocator keeps for itself, and what is made on first use.
+// What is made on first use, and pages of which a part is free.
 constexpr long kSlack = 8 * 1024;
 
 // Rounds of the same work: what is taken for the first time is no growth.
