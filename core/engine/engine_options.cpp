@@ -180,6 +180,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
   if (options.chroma_columns < 1 || options.chroma_columns > 2 || options.chroma_rows < 1 ||
       options.chroma_rows > 2)
     return {Code::invalid_options, "one or two pixels in a row or column share a sample"};
+  if (options.chroma_columns * options.chroma_rows > 1 && options.colours != Colours::yuv)
+    return {Code::invalid_options, "pixels share samples of U and V, not of other colours"};
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};

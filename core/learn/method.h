@@ -23,7 +23,7 @@ struct LearnOptions {
   bool remembers = true;
   int depth = 8;  // bits of the frames' samples, 8 to 16
   // Pixels that share a sample of channels 1 and 2 in all frames, as in ChromaShape. 1: each has
-  // its own, or frames differ, which takes more memory.
+  // its own, or frames differ, which takes more memory. Others than Y, U and V are not shared.
   int chroma_columns = 1, chroma_rows = 1;
 
   static constexpr int kMostDepth = 16;

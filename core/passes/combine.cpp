@@ -20,6 +20,8 @@ struct Sums {
   using V = hn::Vec<D>;
   V a0, a1, b0, b1, c0, c1, e0, e1;
 
+  // One that the compiler makes would not be for this instruction set: on ARM that is an error.
+  HWY_INLINE Sums() {}
   HWY_INLINE void clear() { a0 = a1 = b0 = b1 = c0 = c1 = e0 = e1 = hn::Zero(D()); }
   template <typename T>
   HWY_INLINE void add(const double* coefficients, const T* samples) {

@@ -41,7 +41,10 @@ EngineOptions options_of(const Case& c) {
   options.frame_rate = c.rate;
   options.mask_softness = c.softness;
   options.depth = c.depth;
-  if (c.shared) options.chroma_columns = options.chroma_rows = 2;
+  if (c.shared) {
+    options.colours = Colours::yuv;
+    options.chroma_columns = options.chroma_rows = 2;
+  }
   return options;
 }
 

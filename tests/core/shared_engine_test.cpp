@@ -164,6 +164,21 @@ TEST(SharedEngine, TakesLessMemory) {
   }
 }
 
+// A camera is followed by green, which each pixel of RGB must have.
+TEST(SharedEngine, OtherColoursThanYuvAreRefused) {
+  EngineOptions options = options_of(Method::robust, Mode::batch);
+  for (const auto& [columns, rows] : {std::pair{2, 2}, {2, 1}, {1, 2}}) {
+    options.chroma_columns = columns;
+    options.chroma_rows = rows;
+    for (Colours colours : {Colours::rgb, Colours::grey}) {
+      options.colours = colours;
+      EXPECT_EQ(Status::Code::invalid_options, check_options(options, 16, 16).code);
+    }
+    options.colours = Colours::yuv;
+    EXPECT_TRUE(check_options(options, 16, 16).ok());
+  }
+}
+
 TEST(SharedEngine, FramesThatShareOtherSamplesAreRefused) {
   EngineOptions options = options_of(Method::robust, Mode::batch);
   options.chroma_columns = options.chroma_rows = 2;

@@ -111,7 +111,11 @@ EngineOptions any_options(fuzz::Bytes* bytes) {
   options.frame_rate = sane ? bytes->below(4) * 1000 : bytes->any_double();
   if (!sane && bytes->once_in(2)) options.max_memory = bytes->word();
   options.colours = static_cast<Colours>(bytes->below(3));
-  if (bytes->once_in(3)) options.chroma_columns = options.chroma_rows = 2;
+  if (bytes->once_in(3)) {
+    options.chroma_columns = options.chroma_rows = 2;
+    // Others are refused.
+    if (sane) options.colours = Colours::yuv;
+  }
   if (!sane) options.chroma_rows = bytes->any_int();
   if (bytes->once_in(4)) {
     for (int c = 0; c < 3; ++c) {
