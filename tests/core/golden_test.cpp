@@ -58,7 +58,7 @@ constexpr Trial kTrials[] = {
     {"live-qdmd", Mode::live, Method::qdmd, Output::foreground},
 };
 
-std::vector<PackedPicture> footage(const char* text) {
+std::vector<PackedPicture> rendered(const char* text) {
   scene::SceneOptions options;
   options.width = kWidth;
   options.height = kHeight;
@@ -72,6 +72,27 @@ std::vector<PackedPicture> footage(const char* text) {
     std::copy_n(scene.frame().samples.begin(), picture.bytes.size(), picture.bytes.begin());
     frames.push_back(std::move(picture));
   }
+  return frames;
+}
+
+// Scenes that were rendered elsewhere (tests/neon.sh): the environment names a folder in which
+// their frames are, or where they are put.
+std::vector<PackedPicture> footage(const char* text) {
+  const char* const folder = std::getenv("QDMD_GOLDEN_FRAMES");
+  if (!folder) return rendered(text);
+  const std::string name = std::string(folder) + "/" + text + ".raw";
+  std::vector<PackedPicture> frames(kFrames, PackedPicture(kWidth, kHeight, 3));
+  if (std::ifstream file(name, std::ios::binary); file) {
+    for (PackedPicture& frame : frames)
+      file.read(reinterpret_cast<char*>(frame.bytes.data()), ptrdiff_t(frame.bytes.size()));
+    EXPECT_TRUE(file) << name;
+    return frames;
+  }
+  frames = rendered(text);
+  std::ofstream file(name, std::ios::binary);
+  for (const PackedPicture& frame : frames)
+    file.write(reinterpret_cast<const char*>(frame.bytes.data()), ptrdiff_t(frame.bytes.size()));
+  EXPECT_TRUE(file.flush()) << name;
   return frames;
 }
 
