@@ -100,8 +100,9 @@ EngineOptions any_options(fuzz::Bytes* bytes) {
   options.dmd.rank = sane ? bytes->below(5) : bytes->any_int();
   options.dmd.solver = static_cast<Solver>(bytes->below(5));
   options.dmd.amplitude = static_cast<Amplitude>(bytes->below(2));
-  // The others take many times as long.
-  if (bytes->once_in(4)) options.dmd.estimator = static_cast<Estimator>(bytes->below(4));
+  // The others take longer, the last of them many times.
+  if (const int rare = bytes->once_in(4) ? bytes->below(16) : 0; rare > 0)
+    options.dmd.estimator = static_cast<Estimator>(rare == 3 ? 3 : rare % 3);
   options.dmd.spectrum = bytes->once_in(2);
   options.dmd.omega_threshold = sane ? bytes->byte() / 64.0 : bytes->any_double();
   options.foreground_threshold = sane ? bytes->byte() / 4.0 : bytes->any_double();
