@@ -36,7 +36,7 @@ fi
 # Effects that need OpenCV are not there, and are not called.
 cat >"$build/Makefile" <<MAKE
 CXX = ${ARM_CXX:-aarch64-linux-gnu-g++}
-FLAGS = -std=c++20 -O2 -ffp-contract=off -I. -isystem $build/root/usr/include -isystem /usr/include/eigen3 \\
+FLAGS = -std=c++20 -O2 -ffp-contract=off -U__ARM_FEATURE_FMA -I. -isystem $build/root/usr/include -isystem /usr/include/eigen3 \\
   -DQDMD_GOLDEN_FILE='"$PWD/tests/core/golden.txt"'
 SOURCES = \$(shell git grep -L opencv2/ 'core/*.cpp' ':!core/library' ':!core/metrics')
 OBJECTS = \$(SOURCES:%.cpp=$build/%.o)
