@@ -35,8 +35,9 @@ short() {
     env GTEST_SHARD_INDEX={} "$folder/$name" --gtest_brief=1 --gtest_filter="-$slow"
 }
 
+# A comma in a folder's name would be one between the linker's options.
 long() {
-  local kind=$1 build=build-$1 again=() targets=() names=()
+  local kind=$1 build=build-${1//,/-} again=() targets=() names=()
   [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=disabled -Dwerror=false
@@ -64,7 +65,7 @@ long() {
 # Tests of core/ and gst/ as meson runs them. What measures memory or time is left out: here they are
 # the sanitizer's.
 suite() {
-  local kind=$1 build=build-$1 again=() tests=() programs=()
+  local kind=$1 build=build-${1//,/-} again=() tests=() programs=()
   [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=enabled -Dwerror=false
