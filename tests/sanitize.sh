@@ -81,7 +81,7 @@ import json, os, sys
 for test in json.load(sys.stdin):
     if test["name"] in sys.argv[2:]:
         print(os.path.relpath(test["cmd"][0], sys.argv[1]))' "$build" "${tests[@]}")
-  ninja -C "$build" -j "$(tests/jobs.sh)" gst/libgstqdmd.so "${programs[@]}"
+  ninja -C "$build" -j "$(tests/jobs.sh)" gst/libgstqdmd.so gst/libgstqdmdscene.so "${programs[@]}"
   # A process that looks at plugins would be without the sanitizer.
   export GST_REGISTRY_FORK=no
   # What GLib and GStreamer keep to the end is theirs.
