@@ -74,7 +74,7 @@ import json, re, sys
 left_out = re.compile(r"valgrind|(?<!out_of_)memory$|allocation$|codecs|pacing|time_budget|literal")
 for test in json.load(sys.stdin):
     part = test["suite"][0].partition(":")[2] or test["name"].partition("-")[0]
-    if part in ("core", "fuzz", "soak", "element", "scene") and not left_out.search(test["name"]):
+    if part in ("core", "fuzz", "element", "scene") and not left_out.search(test["name"]):
         print(test["name"])')
   mapfile -t programs < <(meson introspect "$build" --tests | /usr/bin/python3 -c '
 import json, os, sys
