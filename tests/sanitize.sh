@@ -6,7 +6,8 @@
 #   tests/sanitize.sh --long [KIND...]    the tests in which threads meet, those of the kernels, and
 #                                         of the element: many minutes of compiling for each
 #                                         KIND: thread, address,undefined (default: both)
-#   tests/sanitize.sh --suite [KIND...]   the whole suite, leaks too: an hour or more for each KIND
+#   tests/sanitize.sh --suite [KIND...]   the tests of core/ and gst/, leaks too: an hour or more for
+#                                         each KIND
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -11,40 +11,31 @@ void __tsan_release(void* address);
 #define REAL(name) \
   static const auto real = reinterpret_cast<decltype(&name)>(dlsym(RTLD_NEXT, #name))
 
-__attribute__((visibility("default"))) void g_mutex_lock(GMutex* mutex) {
-  REAL(g_mutex_lock);
-  real(mutex);
-  __tsan_acquire(mutex);
-}
-__attribute__((visibility("default"))) gboolean g_mutex_trylock(GMutex* mutex) {
-  REAL(g_mutex_trylock);
-  const gboolean locked = real(mutex);
-  if (locked) __tsan_acquire(mutex);
-  return locked;
-}
-__attribute__((visibility("default"))) void g_mutex_unlock(GMutex* mutex) {
-  REAL(g_mutex_unlock);
-  __tsan_release(mutex);
-  real(mutex);
-}
-// Those of a pad's stream: what held one before has ended what it did.
-__attribute__((visibility("default"))) void g_rec_mutex_lock(GRecMutex* mutex) {
-  REAL(g_rec_mutex_lock);
-  real(mutex);
-  __tsan_acquire(mutex);
-}
-__attribute__((visibility("default"))) gboolean g_rec_mutex_trylock(GRecMutex* mutex) {
-  REAL(g_rec_mutex_trylock);
-  const gboolean locked = real(mutex);
-  if (locked) __tsan_acquire(mutex);
-  return locked;
-}
-__attribute__((visibility("default"))) void g_rec_mutex_unlock(GRecMutex* mutex) {
-  REAL(g_rec_mutex_unlock);
-  __tsan_release(mutex);
-  real(mutex);
-}
-__attribute__((visibility("default"))) void g_cond_wait(GCond* cond, GMutex* mutex) {
+#define SEEN __attribute__((visibility("default")))
+
+#define SEEN_LOCK(name, Type)                 \
+  SEEN void name##_lock(Type* mutex) {        \
+    REAL(name##_lock);                        \
+    real(mutex);                              \
+    __tsan_acquire(mutex);                    \
+  }                                           \
+  SEEN gboolean name##_trylock(Type* mutex) { \
+    REAL(name##_trylock);                     \
+    const gboolean locked = real(mutex);      \
+    if (locked) __tsan_acquire(mutex);        \
+    return locked;                            \
+  }                                           \
+  SEEN void name##_unlock(Type* mutex) {      \
+    REAL(name##_unlock);                      \
+    __tsan_release(mutex);                    \
+    real(mutex);                              \
+  }
+
+SEEN_LOCK(g_mutex, GMutex)
+// Of a pad's stream, among others: what held it before has ended what it did.
+SEEN_LOCK(g_rec_mutex, GRecMutex)
+
+SEEN void g_cond_wait(GCond* cond, GMutex* mutex) {
   REAL(g_cond_wait);
   __tsan_release(mutex);
   real(cond, mutex);
