@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Builds core/ for 64-bit ARM, whose vectors are NEON, with a cross compiler, and runs tests under
 # QEMU: the passes against their slow references, and whether scenes give the bytes that they give
-# here (some of method=robust do not: docs/reliability.md). Half an hour, most of it compiling;
-# everything is kept in build-neon.
+# here. Half an hour, most of it compiling; everything is kept in build-neon.
 #
 #   tests/neon.sh [TEST...]      by their names in tests/core (default: those of the passes, golden)
 set -euo pipefail

@@ -7,10 +7,14 @@ namespace qdmd {
 
 void TemporalModel::add_mode(const QuaternionMatrixd& combination, std::complex<double> lambda,
                              double reference_time, const Quaterniond& amplitude) {
+  // phi lambda^t b = (phi q) (q^-1 lambda^t b) for every q. A mode comes with any complex q, and
+  // where its eigenvalue is nearly real, with nearly any: the least rounding decides. q = b / |b|
+  // gives pictures the same bytes on all machines.
+  const Quaterniond phase = amplitude.unit();
   terms_.push_back({-1, picture_count(), 4, lambda, reference_time, amplitude});
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3 * snapshots_, 4);
   for (int t = 0; t < snapshots_; ++t) {
-    const Quaterniond c = combination.get(t, 0);
+    const Quaterniond c = combination.get(t, 0) * phase;
     // (R i + G j + B k) c, one column for each of the parts 1, i, j, k.
     rows.block<3, 4>(3 * t, 0) << -c.x, c.w, -c.z, c.y,  //
         -c.y, c.z, c.w, -c.x,                            //
@@ -65,8 +69,9 @@ void TemporalModel::weights(double t, Eigen::MatrixXd* out) const {
     weights = Eigen::MatrixXd(3, picture_count());
   weights.setZero();
   for (const Term& term : terms_) {
-    const Quaterniond u = Quaterniond(power(term.lambda, t - term.reference_time)) * term.amplitude;
+    Quaterniond u = Quaterniond(power(term.lambda, t - term.reference_time)) * term.amplitude;
     if (term.channel < 0) {
+      u = term.amplitude.unit().conj() * u;
       // The i, j and k parts of phi u, phi's parts along the columns.
       weights.block<3, 4>(0, term.first_row) << u.x, u.w, u.z, -u.y,  //
           u.y, -u.z, u.w, u.x,                                        //

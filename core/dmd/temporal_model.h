@@ -40,7 +40,7 @@ class TemporalModel {
 
  private:
   struct Term {
-    int channel;  // -1: a quaternion mode, rows for 1, i, j, k; else real and imaginary part
+    int channel;  // -1: a quaternion mode, rows for 1, i, j, k of phi b / |b|; else Re, Im of phi
     Eigen::Index first_row;
     int row_count;
     std::complex<double> lambda;

@@ -84,6 +84,28 @@ TEST(TemporalModel, EqualsQuaternionArithmetic) {
   }
 }
 
+// phi z lambda^t z^-1 b: any complex z, and any quaternion where lambda is real.
+TEST(TemporalModel, PicturesDoNotDependOnTheModesPhase) {
+  std::mt19937 rng(106);
+  const auto combination = random_matrix(5, 1, rng);
+  const Quaterniond amplitude(0.5, -2, 0.75, 1.5);
+  const auto expect_same = [&](std::complex<double> lambda, const Quaterniond& phase) {
+    auto turned = combination;
+    turned.scale_col(0, phase);
+    const auto one = model_of(combination, lambda, amplitude);
+    const auto other = model_of(turned, lambda, phase.inverse() * amplitude);
+    // Two products of quaternions of four terms each, beside those of the model.
+    EXPECT_LE((one.basis() - other.basis()).cwiseAbs().maxCoeff(),
+              32 * kEpsilon * one.basis().cwiseAbs().maxCoeff());
+    for (double t : {-1.0, 0.0, 2.5})
+      EXPECT_LE((one.weights(t) - other.weights(t)).cwiseAbs().maxCoeff(),
+                32 * kEpsilon * one.weights(t).cwiseAbs().maxCoeff());
+  };
+  expect_same({0.9, 0.4}, Quaterniond(0.6, 0.8, 0, 0));
+  expect_same({0.9, 0.4}, Quaterniond(0, -1, 0, 0));
+  expect_same(0.98, Quaterniond(0.5, -0.5, 0.5, 0.5));
+}
+
 TEST(TemporalModel, TakesAnyTime) {
   QuaternionMatrixd one(1, 1);
   one.a(0, 0) = 1;
