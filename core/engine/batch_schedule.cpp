@@ -95,7 +95,9 @@ void BatchSchedule::end_window(bool at_once) {
       static_cast<int>(std::min<int64_t>({window_size_, frames().size(), taken() - from}));
   const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
   waiting_->time_zero = taken() - size;
-  work_ = Work{span, count < size ? count : window.not_added, background().wishes()};
+  // Of frames before another scene nothing is wanted.
+  work_ =
+      Work{span, count < size ? count : std::min(window.not_added, size), background().wishes()};
   // Reads how many frames there are.
   if (background().learner().in_one_piece()) background().begin(span);
   // Frames that leave before it need the model whose place it takes.
@@ -191,6 +193,11 @@ void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
   background().recall(learnt);
   if (shown) background().show(learnt, State::held);
   loaded_ = std::move(loaded);
+}
+
+// Windows come one after the other, also where nobody looks at a window's first frame.
+void BatchSchedule::leave(const Queue& queue) {
+  if (next_to_leave(queue) == shown_.end) advance();
 }
 
 void BatchSchedule::show(int index) {

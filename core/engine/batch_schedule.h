@@ -25,6 +25,7 @@ class BatchSchedule : public Schedule {
   void go_on() override { break_ = false; }
   void restart() override;
   void learn_from(const Learnt& learnt, const Queue& queue) override;
+  void leave(const Queue& queue) override;
   void show(int index) override;
   void show_newest() override;
   int frames_left(const Queue& queue) const override;

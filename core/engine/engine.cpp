@@ -385,6 +385,7 @@ const uint8_t* Engine::whole_mask() {
 
 void Engine::skip() {
   if (!ready()) return;
+  flushed_if_it_throws([&] { schedule_->leave(queue_); });
   if (soft_mask_ && !softened_) soft_mask_->forget();
   --queue_.pending;
   --queue_.ready;

@@ -53,7 +53,8 @@ class Engine {
   // where foreground, else 0, width * height samples in row order. Good until skip(). Null unless
   // ready().
   const uint8_t* whole_mask();
-  // Call it when the next frame has left, and only while ready().
+  // The next frame leaves. Call it once its pictures are written, if anybody wants some, and only
+  // while ready().
   void skip();
   // write() in the configured levels, and skip().
   void pop(Output output, const MutableImageView& out);

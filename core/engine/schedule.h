@@ -62,6 +62,8 @@ class Schedule {
   // What an earlier run learnt, of frames of this size, no solve being under way. No frame is lost.
   // Where it throws, all is as it was.
   virtual void learn_from(const Learnt& learnt, const Queue& queue) = 0;
+  // The next frame is about to leave, whether anybody asked for its pictures or not.
+  virtual void leave(const Queue&) {}
   // Sets the model to the time, and the light, of frame `index` of the store.
   virtual void show(int index) = 0;
   // The same for the newest background.

@@ -113,6 +113,37 @@ TEST(Engine, DrainBreaksTime) {
   EXPECT_FALSE(strip.engine.ready());
 }
 
+// A window ends with its frames, whether anybody asked for their pictures or not.
+TEST(Engine, FramesThatNobodyLooksAtLeaveLikeOthers) {
+  std::mt19937 rng(115);
+  for (const Method method : {Method::qdmd, Method::robust})
+    for (int count : {1, 3, 5, 8, 9}) {
+      SCOPED_TRACE(count);
+      auto options = window_of(4);
+      options.method = method;
+      Strip looked(10, options), skipped(10, options);
+      for (int stream = 0; stream < 4; ++stream) {
+        for (int t = 0; t < count; ++t) {
+          const auto picture = random_picture(10, rng);
+          for (Strip* strip : {&looked, &skipped}) {
+            ASSERT_TRUE(strip->push(picture).ok());
+            while (strip->engine.ready()) strip->engine.skip();
+          }
+        }
+        looked.engine.drain();
+        skipped.engine.drain();
+        const auto expected = looked.pop_all(Output::background);
+        // Of every second stream the last picture, of the others none.
+        while (skipped.engine.pending() > stream % 2) skipped.engine.skip();
+        const auto last = skipped.pop_all(Output::background);
+        if (stream % 2 == 1) {
+          EXPECT_EQ(last.at(0), expected.back());
+        }
+        EXPECT_EQ(skipped.engine.solves(), looked.engine.solves());
+      }
+    }
+}
+
 TEST(Engine, FlushForgets) {
   std::mt19937 rng(115);
   Strip strip(30, window_of(6));

@@ -231,6 +231,19 @@ TEST(Stabilize, ACameraThatGoesOnIsAnotherScene) {
   }
 }
 
+// A view that begins with a window's last frames leaves it fewer than a group.
+TEST(Stabilize, AViewMayBeginAnywhereInAWindow) {
+  const Film pan = film("noise,jitter=0:drift=20:way=400", 60);
+  for (int window = 11; window <= 16; ++window) {
+    EngineOptions options = robust(Stabilize::translation);
+    options.method = Method::qdmd;
+    options.window_size = window;
+    const Result once = run(pan, options, Output::background);
+    options.threads = 2;
+    EXPECT_EQ(run(pan, options, Output::background).pictures, once.pictures) << window;
+  }
+}
+
 TEST(Stabilize, TakesAnySizeAndAnyFrame) {
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {9, 8}, {31, 33}}) {
     Film any;
