@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Puts the figures of docs/reliability.md anew, from the logs of runs that took hours:
 #
-#   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log
+#   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log; those of several
+#                                                         runs may be joined to one
 #   build/tests/fuzz/fuzz-TARGET --random N --seed 77     a line each, by hand, in build/random.log
 #   build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
@@ -29,7 +30,11 @@ block() {
 }
 lines_of() {
   case "$1" in
-    fuzz) grep -E 'DONE|Done|stat::number_of|stat::average|ERROR|SUMMARY' "$2" | tail -n 5 ;;
+    fuzz)
+      grep -aE 'DONE|Done|stat::number_of|stat::average|ERROR|SUMMARY' "$2" | tail -n 5
+      awk '/stat::number_of/ { sum += $2; ++runs }
+           END { if (runs > 1) print "sum of " runs " runs: " sum " executions" }' "$2"
+      ;;
     coverage) grep -E '^TOTAL' "$2" ;;
     random) cat "$2" ;;
     *) tail -n 40 "$2" ;;
