@@ -154,7 +154,7 @@ void expect_near(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& 
   ASSERT_EQ(bytes.size(), reference.size());
   size_t other = 0;
   for (size_t i = 0; i < bytes.size(); ++i) other += bytes[i] != reference[i];
-  EXPECT_LE(static_cast<double>(other), 5e-3 * static_cast<double>(bytes.size()));
+  EXPECT_LE(static_cast<double>(other), 1e-4 * static_cast<double>(bytes.size()));
   if (other)
     std::printf("%s: %zu of %zu bytes are other ones\n", hwy::TargetName(hwy::SupportedTargets()),
                 other, bytes.size());
