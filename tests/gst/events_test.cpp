@@ -292,10 +292,13 @@ void run(const std::string& text, const std::function<void(GstBin*)>& use = null
   GstBus* bus = gst_element_get_bus(pipeline);
   GstMessage* end = gst_bus_timed_pop_filtered(bus, 60 * GST_SECOND,
                                                GstMessageType(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  ASSERT_NE(nullptr, end) << "no end after a minute";
-  EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(end));
-  gst_message_unref(end);
-  if (use) use(GST_BIN(pipeline));
+  // A pipeline that is only slow is stopped all the same: the process could not end beside it.
+  EXPECT_NE(nullptr, end) << "no end after a minute";
+  if (end) {
+    EXPECT_EQ(GST_MESSAGE_EOS, GST_MESSAGE_TYPE(end));
+    gst_message_unref(end);
+    if (use) use(GST_BIN(pipeline));
+  }
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   gst_object_unref(pipeline);
