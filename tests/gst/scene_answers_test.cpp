@@ -1,0 +1,125 @@
+// What qdmdscenesrc answers when it is asked: properties, queries, messages.
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+namespace {
+
+struct Unref {
+  void operator()(void* object) const { gst_object_unref(object); }
+};
+using Element = std::unique_ptr<GstElement, Unref>;
+
+Element pipeline_of(const std::string& text) {
+  GError* error = nullptr;
+  Element pipeline(gst_parse_launch(text.c_str(), &error));
+  EXPECT_EQ(error, nullptr) << error->message;
+  return pipeline;
+}
+
+constexpr const char* kCaps =
+    " ! video/x-raw,format=RGB,width=96,height=64,framerate=25/1 ! fakesink sync=false";
+
+TEST(SceneAnswers, PropertiesAreThoseThatWereSet) {
+  const Element source(
+      GST_ELEMENT(gst_object_ref_sink(gst_element_factory_make("qdmdscenesrc", nullptr))));
+  gst_util_set_object_arg(G_OBJECT(source.get()), "truth", "mask");
+  g_object_set(source.get(), "scene", "storm", "effects", "noise=3", "seed", G_MAXUINT64, "is-live",
+               TRUE, "post-messages", TRUE, nullptr);
+  gchar *scene = nullptr, *effects = nullptr;
+  guint64 seed = 0;
+  gboolean live = FALSE, posts = FALSE;
+  g_object_get(source.get(), "scene", &scene, "effects", &effects, "seed", &seed, "is-live", &live,
+               "post-messages", &posts, nullptr);
+  EXPECT_STREQ(scene, "storm");
+  EXPECT_STREQ(effects, "noise=3");
+  EXPECT_EQ(seed, G_MAXUINT64);
+  EXPECT_TRUE(live);
+  EXPECT_TRUE(posts);
+  g_free(scene);
+  g_free(effects);
+
+  GValue truth = G_VALUE_INIT;
+  g_object_get_property(G_OBJECT(source.get()), "truth", &truth);
+  EXPECT_STREQ(g_enum_get_value(G_ENUM_CLASS(g_type_class_peek(G_VALUE_TYPE(&truth))),
+                                g_value_get_enum(&truth))
+                   ->value_nick,
+               "mask");
+  g_value_unset(&truth);
+}
+
+// One for each frame, in its time, and only if it is asked for.
+TEST(SceneAnswers, AMessageSaysWhereTheCameraLooks) {
+  for (const bool asked : {true, false}) {
+    const Element pipeline =
+        pipeline_of("qdmdscenesrc scene=jitter=2 num-buffers=20 post-messages=" +
+                    std::string(asked ? "true" : "false") + kCaps);
+    ASSERT_TRUE(pipeline);
+    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+    GstBus* bus = gst_element_get_bus(pipeline.get());
+    guint64 count = 0, moved = 0;
+    bool ended = false;
+    while (!ended) {
+      GstMessage* message = gst_bus_timed_pop_filtered(
+          bus, 60 * GST_SECOND,
+          GstMessageType(GST_MESSAGE_ELEMENT | GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+      EXPECT_NE(message, nullptr) << "no end after a minute";
+      ended = !message || GST_MESSAGE_TYPE(message) != GST_MESSAGE_ELEMENT;
+      const GstStructure* structure = message ? gst_message_get_structure(message) : nullptr;
+      if (!ended && gst_structure_has_name(structure, "qdmdscenesrc-camera")) {
+        guint64 timestamp = 0;
+        double x = 99, y = 99, angle = 99;
+        EXPECT_TRUE(gst_structure_get(structure, "timestamp", G_TYPE_UINT64, &timestamp, "camera-x",
+                                      G_TYPE_DOUBLE, &x, "camera-y", G_TYPE_DOUBLE, &y,
+                                      "camera-angle", G_TYPE_DOUBLE, &angle, nullptr));
+        EXPECT_EQ(timestamp, count * GST_SECOND / 25);
+        // Shaking by two pixels is a few at most, and does not turn the picture.
+        EXPECT_LT(std::hypot(x, y), 16);
+        EXPECT_EQ(angle, 0);
+        moved += x != 0 || y != 0;
+        ++count;
+      }
+      if (message) gst_message_unref(message);
+    }
+    EXPECT_EQ(count, asked ? 20u : 0u);
+    if (asked) {
+      EXPECT_GE(moved, 10u);
+    }
+    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+    gst_object_unref(bus);
+  }
+}
+
+TEST(SceneAnswers, FramesAreConvertedToTime) {
+  const Element pipeline = pipeline_of("qdmdscenesrc name=source" + std::string(kCaps));
+  ASSERT_TRUE(pipeline);
+  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
+  EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+            GST_STATE_CHANGE_SUCCESS);
+  const Element source(gst_bin_get_by_name(GST_BIN(pipeline.get()), "source"));
+  gint64 converted = 0;
+  EXPECT_TRUE(
+      gst_element_query_convert(source.get(), GST_FORMAT_DEFAULT, 50, GST_FORMAT_TIME, &converted));
+  EXPECT_EQ(converted, gint64(2 * GST_SECOND));
+  EXPECT_TRUE(gst_element_query_convert(source.get(), GST_FORMAT_TIME, gint64(GST_SECOND),
+                                        GST_FORMAT_DEFAULT, &converted));
+  EXPECT_EQ(converted, 25);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+// Backwards from an end that there is not: the seek is refused, and the source plays on.
+TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
+  const Element pipeline = pipeline_of("qdmdscenesrc" + std::string(kCaps));
+  ASSERT_TRUE(pipeline);
+  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
+  EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+            GST_STATE_CHANGE_SUCCESS);
+  EXPECT_FALSE(gst_element_seek(pipeline.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+}  // namespace
