@@ -99,20 +99,6 @@ void close(GstElement* self) {
   state->engine.close();
 }
 
-// Copies what others may want to know of the engine.
-static void publish_report(GstElement* self, guint64 frames_in, guint64 frames_out) {
-  State* state = state_of(self);
-  const Engine& engine = state->engine;
-  GST_OBJECT_LOCK(self);
-  state->counters.frames_in += frames_in;
-  state->counters.frames_out += frames_out;
-  state->counters.solve_period = guint(engine.time_budget().effort().period);
-  state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
-  state->counters.camera = engine.newest_pose();
-  state->report = engine.report();
-  GST_OBJECT_UNLOCK(self);
-}
-
 // The time of the frames that leave with the newest solve: `leaving`, if there is one, and those of
 // them that wait.
 struct FrameTime {
@@ -133,33 +119,53 @@ static FrameTime time_of_solve(const State& state, GstBuffer* leaving) {
   return time;
 }
 
-// After a call that may bring a background into use, with the engine lock: the property's picture
-// and its time belong together.
-static void note_solve(GstElement* self, GstBuffer* leaving) {
+// Backgrounds that came into use, and what was found of the newest one.
+struct NewSolves {
+  guint64 count = 0;
+  SolveReport report;
+  FrameTime time;
+};
+
+// After `frames_in` frames went into the engine and `frames_out` came out, with the engine lock,
+// since another thread may load a background: copies what others may want to know of the engine.
+// The background property's picture and its time belong together.
+static NewSolves publish(GstElement* self, guint64 frames_in, guint64 frames_out,
+                         GstBuffer* leaving) {
   State* state = state_of(self);
-  if (state->engine.solves() == state->solves_told) return;
-  const FrameTime time = time_of_solve(*state, leaving);
-  state->background.solved(*state->segment, time.timestamp, time.duration);
+  const Engine& engine = state->engine;
+  NewSolves solves;
+  solves.count = engine.solves() - state->solves_told;
+  state->solves_told += solves.count;
+  if (solves.count > 0) {
+    solves.report = engine.report();
+    solves.time = time_of_solve(*state, leaving);
+    state->background.solved(*state->segment, solves.time.timestamp, solves.time.duration);
+  }
+  GST_OBJECT_LOCK(self);
+  state->counters.frames_in += frames_in;
+  state->counters.frames_out += frames_out;
+  state->counters.solves += solves.count;
+  state->counters.solve_period = guint(engine.time_budget().effort().period);
+  state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
+  state->counters.camera = engine.newest_pose();
+  state->report = engine.report();
+  GST_OBJECT_UNLOCK(self);
+  return solves;
 }
 
 // Says what a new solve found.
-static void tell_of_solve(GstElement* self, GstBuffer* leaving) {
+static void tell_of(GstElement* self, const NewSolves& solves) {
+  if (solves.count == 0) return;
   State* state = state_of(self);
-  const guint64 solves = state->engine.solves() - state->solves_told;
-  if (solves == 0) return;
-  state->solves_told += solves;
   GST_OBJECT_LOCK(self);
-  state->counters.solves += solves;
   const bool post = state->settings.post_messages;
   const Counters counters = state->counters;
   GST_OBJECT_UNLOCK(self);
   if (!post) return;
-  const FrameTime time = time_of_solve(*state, leaving);
   gst_element_post_message(
-      self,
-      gst_message_new_element(GST_OBJECT(self),
-                              make_solve_message(state->engine.report(), counters, *state->segment,
-                                                 time.timestamp, time.duration)));
+      self, gst_message_new_element(
+                GST_OBJECT(self), make_solve_message(solves.report, counters, *state->segment,
+                                                     solves.time.timestamp, solves.time.duration)));
 }
 
 // Says that the frame of that time, or one a few frames before it, began another scene.
@@ -268,6 +274,7 @@ GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   }
   const std::vector<Region>* regions = nullptr;
   Pose pose;
+  NewSolves solves;
   {
     std::optional<MappedVideoFrame> frames[OutputPictures::kMost];
     size_t mapped = 0;
@@ -292,7 +299,7 @@ GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
       for (const OutputPicture& picture : *pictures)
         engine.write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
       engine.skip();
-      note_solve(self, shell.get());
+      solves = publish(self, 0, 1, shell.get());
       return Status();
     });
     if (!written) {
@@ -302,8 +309,7 @@ GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   }
   if (regions)
     for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
-  publish_report(self, 0, 1);
-  tell_of_solve(self, shell.get());
+  tell_of(self, solves);
   tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
   return GST_FLOW_OK;
 }
@@ -313,16 +319,17 @@ GstFlowReturn drain(GstElement* self) {
   if (!state->engine.configured()) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
-  const auto solve = [self](Engine& engine) {
+  NewSolves solves;
+  const auto solve = [&](Engine& engine) {
     Status status = engine.drain();
-    note_solve(self, nullptr);
+    if (status.ok()) solves = publish(self, 0, 0, nullptr);
     return status;
   };
   if (!with_engine(self, solve)) {
     drop_frames(self);
     return GST_FLOW_ERROR;
   }
-  tell_of_solve(self, nullptr);
+  tell_of(self, solves);
   while (state->goes_on(flow) && state->engine.ready()) {
     OutputPictures pictures;
     flow = next_pictures(self, &pictures);
@@ -506,6 +513,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       shell.get(), buffer.get(),
       GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
       0, gsize(-1));
+  NewSolves solves;
   {
     const MappedVideoFrame frame(&state->info, buffer.get(), GST_MAP_READ);
     if (!frame) {
@@ -523,7 +531,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
       engine.set_ignored(ignored_of(settings, buffer.get()));
       Status status = engine.push(frame.view<const uint8_t>());
-      note_solve(self, nullptr);
+      if (status.ok()) solves = publish(self, 1, 0, nullptr);
       return status;
     });
     if (!taken) {
@@ -531,10 +539,9 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       return GST_FLOW_ERROR;
     }
   }
-  publish_report(self, 1, 0);
   tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
   warn_of_no_room(self);
-  tell_of_solve(self, nullptr);
+  tell_of(self, solves);
   follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;
 }
