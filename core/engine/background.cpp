@@ -118,6 +118,7 @@ void Background::replace_next() {
 void Background::rehearse(const MaskWishes& wishes) {
   constexpr int kEvery = 4;
   const bool fixed = wishes.threshold > 0;
+  decision_.set_shadows(wishes.shadows);
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
   std::vector<uint8_t> room(room_for_planes(snapshots_->shape()));
@@ -132,6 +133,7 @@ void Background::rehearse(const MaskWishes& wishes) {
 
 void Background::decide(const uint8_t* const x[3], Pool* pool) {
   const bool fixed = wishes_.threshold > 0;
+  decision_.set_shadows(wishes_.shadows);
   decision_.decide({{x[0], x[1], x[2]},
                     &model(),
                     report_.foreground.threshold,

@@ -21,6 +21,7 @@ struct MaskWishes {
   double threshold = 0;  // a pixel differs above this quaternion norm; 0: from the noise
   bool expected = true;  // somebody is going to look at them
   IgnoredAreas ignored = {};
+  Shadows shadows = Shadows::background;  // what the background in another light becomes
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any

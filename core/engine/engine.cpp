@@ -59,7 +59,6 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   if (options.mask_softness > 0) soft_mask_ = std::make_unique<SoftMask>(width, height);
   pass_wishes();
   background_->learner().set_absorb_frames(absorb_frames_);
-  background_->decision().set_shadows(shadows_);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
     restorer_ = std::make_unique<Restorer>(width, height);
@@ -175,7 +174,7 @@ void Engine::set_masks_expected(bool expected) {
 
 void Engine::pass_wishes() {
   if (background_)
-    background_->set_wishes({options_.foreground_threshold, masks_expected_, ignored_});
+    background_->set_wishes({options_.foreground_threshold, masks_expected_, ignored_, shadows_});
 }
 
 void Engine::set_threads(int threads) {
@@ -189,7 +188,7 @@ void Engine::set_absorb_frames(int64_t frames) {
 
 void Engine::set_shadows(Shadows shadows) {
   shadows_ = shadows;
-  if (background_) background_->decision().set_shadows(shadows);
+  pass_wishes();
 }
 
 // What is needed for a picture of L at the time that it is set to.
