@@ -109,6 +109,14 @@ void take_stack(Stack* stack) {
   inside = false;
 }
 
+// Several threads may fail at once.
+void keep_stack(Stack* kept) {
+  Stack stack;
+  take_stack(&stack);
+  const Lock lock;
+  *kept = stack;
+}
+
 bool same(const Stack& a, const Stack& b) {
   return a.depth == b.depth && std::equal(a.frame, a.frame + static_cast<size_t>(a.depth), b.frame);
 }
@@ -191,7 +199,7 @@ bool sees(const void* caller) {
 // Counts an allocation. False: it shall fail.
 bool allow(size_t size) {
   const int64_t n = ++allocations;
-  if (n == 1) take_stack(&first_stack);
+  if (n == 1) keep_stack(&first_stack);
   if (const int64_t noted = n - noting_from; noting_places && noted <= kMostPlaces) {
     Stack stack;
     take_stack(&stack);
@@ -204,7 +212,7 @@ bool allow(size_t size) {
   }
   if (n < fail_from || n >= fail_to) return true;
   ++failures;
-  take_stack(&failed_stack);
+  keep_stack(&failed_stack);
   return false;
 }
 
@@ -250,16 +258,17 @@ void see_only_this_thread(bool only) { only_thread = only ? &unseen : nullptr; }
 
 void start() {
   looking = false;
-  loader.count = 0;
-  note_code("/ld-linux", &loader);
+  // It does not move, and threads of a run before this one may look at it.
+  if (loader.count == 0) note_code("/ld-linux", &loader);
   // The first one loads a library.
-  take_stack(&first_stack);
-  first_stack.depth = failed_stack.depth = 0;
+  Stack none;
+  take_stack(&none);
   fail_no_more();
   allocations = failures = 0;
   noting_places = noting_sites = false;
   {
     const Lock lock;
+    first_stack.depth = failed_stack.depth = 0;
     if (blocks > 0)
       for (Block& block : table) block.at = nullptr;
     blocks = 0;

@@ -41,5 +41,13 @@ SEEN void g_cond_wait(GCond* cond, GMutex* mutex) {
   real(cond, mutex);
   __tsan_acquire(mutex);
 }
+
+SEEN gboolean g_cond_wait_until(GCond* cond, GMutex* mutex, gint64 end) {
+  REAL(g_cond_wait_until);
+  __tsan_release(mutex);
+  const gboolean woken = real(cond, mutex, end);
+  __tsan_acquire(mutex);
+  return woken;
+}
 }
 #endif
