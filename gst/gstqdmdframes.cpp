@@ -153,8 +153,8 @@ static NewSolves publish(GstElement* self, guint64 frames_in, guint64 frames_out
   return solves;
 }
 
-// Says what a new solve found.
-static void tell_of(GstElement* self, const NewSolves& solves) {
+// Says what new solves found.
+static void tell_of_solves(GstElement* self, const NewSolves& solves) {
   if (solves.count == 0) return;
   State* state = state_of(self);
   GST_OBJECT_LOCK(self);
@@ -309,7 +309,7 @@ GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   }
   if (regions)
     for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
-  tell_of(self, solves);
+  tell_of_solves(self, solves);
   tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
   return GST_FLOW_OK;
 }
@@ -329,7 +329,7 @@ GstFlowReturn drain(GstElement* self) {
     drop_frames(self);
     return GST_FLOW_ERROR;
   }
-  tell_of(self, solves);
+  tell_of_solves(self, solves);
   while (state->goes_on(flow) && state->engine.ready()) {
     OutputPictures pictures;
     flow = next_pictures(self, &pictures);
@@ -541,7 +541,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
   }
   tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
   warn_of_no_room(self);
-  tell_of(self, solves);
+  tell_of_solves(self, solves);
   follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;
 }

@@ -20,6 +20,12 @@ Element pipeline_of(const std::string& text) {
   return pipeline;
 }
 
+void pause(const Element& pipeline) {
+  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
+  EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+            GST_STATE_CHANGE_SUCCESS);
+}
+
 constexpr const char* kCaps =
     " ! video/x-raw,format=RGB,width=96,height=64,framerate=25/1 ! fakesink sync=false";
 
@@ -76,7 +82,7 @@ TEST(SceneAnswers, AMessageSaysWhereTheCameraLooks) {
                                       G_TYPE_DOUBLE, &x, "camera-y", G_TYPE_DOUBLE, &y,
                                       "camera-angle", G_TYPE_DOUBLE, &angle, nullptr));
         EXPECT_EQ(timestamp, count * GST_SECOND / 25);
-        // Shaking by two pixels is a few at most, and does not turn the picture.
+        // The camera shakes by about two pixels and does not turn.
         EXPECT_LT(std::hypot(x, y), 16);
         EXPECT_EQ(angle, 0);
         moved += x != 0 || y != 0;
@@ -96,9 +102,7 @@ TEST(SceneAnswers, AMessageSaysWhereTheCameraLooks) {
 TEST(SceneAnswers, FramesAreConvertedToTime) {
   const Element pipeline = pipeline_of("qdmdscenesrc name=source" + std::string(kCaps));
   ASSERT_TRUE(pipeline);
-  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
-  EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
-            GST_STATE_CHANGE_SUCCESS);
+  pause(pipeline);
   const Element source(gst_bin_get_by_name(GST_BIN(pipeline.get()), "source"));
   gint64 converted = 0;
   EXPECT_TRUE(
@@ -110,13 +114,11 @@ TEST(SceneAnswers, FramesAreConvertedToTime) {
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 
-// Backwards from an end that there is not: the seek is refused, and the source plays on.
+// Of a scene without a length.
 TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
   const Element pipeline = pipeline_of("qdmdscenesrc" + std::string(kCaps));
   ASSERT_TRUE(pipeline);
-  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
-  EXPECT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
-            GST_STATE_CHANGE_SUCCESS);
+  pause(pipeline);
   EXPECT_FALSE(gst_element_seek(pipeline.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
                                 GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
