@@ -118,14 +118,14 @@ void Background::replace_next() {
 void Background::rehearse(const MaskWishes& wishes) {
   constexpr int kEvery = 4;
   const bool fixed = wishes.threshold > 0;
-  decision_.set_shadows(wishes.shadows);
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
   std::vector<uint8_t> room(room_for_planes(snapshots_->shape()));
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
     Comparison frame = {
-        {}, &model, foreground.threshold, fixed ? nullptr : model.limits(), fixed, &wishes.ignored};
+        {},    &model,          foreground.threshold, fixed ? nullptr : model.limits(),
+        fixed, &wishes.ignored, wishes.shadows};
     read_planes(snapshots_->picture(t), room.data(), frame.x);
     decision_.decide(frame, room_.pool);
   }
@@ -133,13 +133,13 @@ void Background::rehearse(const MaskWishes& wishes) {
 
 void Background::decide(const uint8_t* const x[3], Pool* pool) {
   const bool fixed = wishes_.threshold > 0;
-  decision_.set_shadows(wishes_.shadows);
   decision_.decide({{x[0], x[1], x[2]},
                     &model(),
                     report_.foreground.threshold,
                     fixed ? nullptr : model().limits(),
                     fixed,
-                    &wishes_.ignored},
+                    &wishes_.ignored,
+                    wishes_.shadows},
                    pool);
 }
 

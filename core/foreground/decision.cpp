@@ -271,7 +271,8 @@ const uint8_t* Decision::mask_row(int y) const {
 }
 
 void Decision::clear_marks() {
-  if (shadows_ == Shadows::marked) std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
+  if (now_.frame.shadows == Shadows::marked)
+    std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
 }
 
 // What differs, and what of it is foreground. A row of cells is explained as soon as the rows of
@@ -446,7 +447,7 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     }
     p = end;
   }
-  if (knows_light_ && shadows_ != Shadows::foreground) leave_shadows(run);
+  if (knows_light_ && now_.frame.shadows != Shadows::foreground) leave_shadows(run);
 }
 
 // Distances and limits of a run.
@@ -486,8 +487,9 @@ void Decision::look_around(Run* run) {
 void Decision::leave_shadows(const Run& run) {
   constexpr auto kMost = static_cast<int>(kShadingRun);
   uint8_t* const foreground = foreground_row(run.y) + run.left;
-  uint8_t* const marks =
-      shadows_ == Shadows::marked ? of_.shaded.data() + shape_.first(run.y) + run.left : nullptr;
+  uint8_t* const marks = now_.frame.shadows == Shadows::marked
+                             ? of_.shaded.data() + shape_.first(run.y) + run.left
+                             : nullptr;
   for (int first = 0; first < run.count;) {
     const void* const next =
         std::memchr(foreground + first, 255, static_cast<size_t>(run.count - first));

@@ -35,6 +35,7 @@ struct Comparison {
   bool fixed = false;
   // Where all is background, whatever the frame shows, and nothing is learnt from it; or null.
   const IgnoredAreas* ignored = nullptr;
+  Shadows shadows = Shadows::background;
 };
 
 // A pixel that differs from L is foreground unless
@@ -61,8 +62,6 @@ class Decision {
 
   // The next frame is of another stream.
   void forget();
-  void set_shadows(Shadows shadows) { shadows_ = shadows; }
-  Shadows shadows() const { return shadows_; }
   // True where no frame was decided since forget().
   bool new_born() const { return frames_ == 0; }
 
@@ -75,7 +74,7 @@ class Decision {
   const uint8_t* whole_mask() const { return band_.is_whole() ? mask() : whole_.data(); }
   // The same where shadows are marked: 255 where light alone differs.
   const uint8_t* shaded() const {
-    return shadows_ == Shadows::marked ? of_.shaded.data() : nullptr;
+    return now_.frame.shadows == Shadows::marked ? of_.shaded.data() : nullptr;
   }
   // L of a row in that frame, 3 planes.
   void level(int y, const uint8_t* out[3]) const;
@@ -149,7 +148,6 @@ class Decision {
   Band band_;
   Shape shape_;
   DecisionSteps steps_;
-  Shadows shadows_ = Shadows::background;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
   uint8_t black_[3];
   bool knows_light_;

@@ -28,11 +28,9 @@ size_t samples_of(const Band& band, int width, int step) {
 }
 
 // Samples of chroma that are spread to pixels at a time; of deep ones two digits of a row.
-size_t spread_size(int width, int height, const FrameContents& contents) {
+size_t spread_size(int width, const FrameContents& contents) {
   if (contents.low_bits == 0 && contents.chroma_columns == 1) return 0;
-  return contents.cells_along > 0 && contents.chroma_columns > 1
-             ? cells_room(Grid(width, height, contents.cells_along))
-             : 2 * static_cast<size_t>(width);
+  return 2 * static_cast<size_t>(width);
 }
 
 // What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
@@ -52,7 +50,7 @@ FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameCon
       most_bytes_(most_bytes),
       planes_(contents.chroma_columns > 1 ? Window(capacity, shape_of(width, height_, contents))
                                           : Window(capacity, pixels_of(width, height_))),
-      spread_(spread_size(width, height_, contents)),
+      spread_(spread_size(width, contents)),
       constant_alpha_(static_cast<size_t>(capacity), 255),
       varies_(static_cast<size_t>(capacity), 0),
       poses_(static_cast<size_t>(capacity)) {
@@ -75,7 +73,7 @@ uint64_t FrameStore::bytes(int capacity, int width, const Band& band,
   const int height = band.rows();
   uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents));
   uint64_t beside =
-      (2 + sizeof(Pose)) * static_cast<uint64_t>(capacity) + spread_size(width, height, contents);
+      (2 + sizeof(Pose)) * static_cast<uint64_t>(capacity) + spread_size(width, contents);
   const bool deep = contents.low_bits > 0;
   if (contents.sample_step > 1)
     beside +=
@@ -143,7 +141,7 @@ void FrameStore::take_contents(int slot) {
     }
   }
   if (cells_.cells() == 0) return;
-  find_own_cells(grid_, band_, picture, &cells_, slot, spread_.data());
+  find_own_cells(grid_, band_, picture, &cells_, slot);
   if (band_.is_whole()) return;
   to_share_[static_cast<size_t>(slot)] = 1;
   any_to_share_ = true;

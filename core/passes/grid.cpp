@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <span>
-
-#include "core/passes/read_samples.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/grid.cpp"
@@ -37,6 +34,14 @@ void sum_columns(const uint8_t* samples, size_t stride, size_t rows, size_t coun
   }
 }
 
+// The same of the rows of pixels that share these samples: `shared` rows each, of the first and the
+// last one so many less.
+void weigh_columns(const uint8_t* first, uint32_t less_first, const uint8_t* last,
+                   uint32_t less_last, uint32_t shared, size_t count, uint32_t* HWY_RESTRICT sums) {
+  for (size_t x = 0; x < count; ++x)
+    sums[x] = shared * sums[x] - less_first * first[x] - less_last * last[x];
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace qdmd
 HWY_AFTER_NAMESPACE();
@@ -46,6 +51,7 @@ namespace qdmd {
 namespace {
 
 HWY_EXPORT(sum_columns);
+HWY_EXPORT(weigh_columns);
 
 }  // namespace
 
@@ -59,38 +65,72 @@ Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(hei
 
 namespace {
 
-// Of rows of cells first .. end - 1; the plane begins with row `plane_top` of the picture.
-void means_of_rows(const Grid& grid, int first_row, int end_row, const uint8_t* plane,
-                   int plane_top, float* means) {
+// The samples of a plane, which `columns` x `rows` pixels share; it begins with row `top` of the
+// picture.
+struct Samples {
+  const uint8_t* plane;
+  int top = 0;
+  int columns = 1, rows = 1;
+};
+
+constexpr auto kColumns = static_cast<int>(HWY_NAMESPACE::kColumns);
+
+// The sums of columns first .. first + count - 1 of samples, over rows of pixels top .. bottom - 1.
+void sum_rows(const Grid& grid, const Samples& samples, int top, int bottom, int first, int count,
+              uint32_t* sums) {
+  const auto stride = static_cast<size_t>((grid.width + samples.columns - 1) / samples.columns);
+  const int shared = samples.rows, begin = top / shared, last = (bottom - 1) / shared;
+  const auto row = [&](int y) { return samples.plane + static_cast<size_t>(y) * stride + first; };
+  HWY_DYNAMIC_DISPATCH(sum_columns)
+  (row(begin), stride, static_cast<size_t>(last + 1 - begin), static_cast<size_t>(count), sums);
+  if (shared == 1) return;
+  HWY_DYNAMIC_DISPATCH(weigh_columns)
+  (row(begin), static_cast<uint32_t>(top - begin * shared), row(last),
+   static_cast<uint32_t>((last + 1) * shared - bottom), static_cast<uint32_t>(shared),
+   static_cast<size_t>(count), sums);
+}
+
+// The sum of pixels left .. right - 1 > left, of which `columns` share each of `sums`.
+uint64_t sum_pixels(const uint32_t* sums, int columns, int left, int right) {
+  const int begin = left / columns, last = (right - 1) / columns;
+  uint64_t sum = 0;
+  for (int s = begin; s <= last; ++s) sum += sums[s];
+  if (columns == 1) return sum;
+  return static_cast<uint64_t>(columns) * sum -
+         static_cast<uint64_t>(left - begin * columns) * sums[begin] -
+         static_cast<uint64_t>((last + 1) * columns - right) * sums[last];
+}
+
+// Of rows of cells first .. end - 1.
+void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& samples,
+                   float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
-  constexpr int kColumns = 2048;
   alignas(64) uint32_t sums[kColumns];
   std::array<int, 2 * kMostCellsAlong + 1> left;
   for (int col = 0; col <= grid.cols; ++col) left[static_cast<size_t>(col)] = grid.left(col);
+  const int most = kColumns * samples.columns;
   for (int row = first_row; row < end_row; ++row) {
-    const int top = grid.top(row), height = grid.top(row + 1) - top;
+    const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
     const int* next = left.data() + 1;  // where the cell ends
     uint64_t cell = 0;
-    for (int first = 0; first < grid.width; first += kColumns) {
-      const int count = std::min(kColumns, grid.width - first);
-      HWY_DYNAMIC_DISPATCH(sum_columns)
-      (plane + static_cast<ptrdiff_t>(top - plane_top) * grid.width + first,
-       static_cast<size_t>(grid.width), static_cast<size_t>(height), static_cast<size_t>(count),
-       sums);
+    for (int first = 0; first < grid.width; first += most) {
+      const int count = std::min(most, grid.width - first);
+      sum_rows(grid, samples, top, bottom, first / samples.columns,
+               (count + samples.columns - 1) / samples.columns, sums);
       // A cell may end in these columns or go on in the next.
       for (int x = 0; x < count;) {
         const int end = std::min(count, *next - first);
-        for (; x < end; ++x) cell += sums[x];
+        cell += sum_pixels(sums, samples.columns, x, end);
+        x = end;
         if (first + x < *next) break;
-        *means++ = static_cast<float>(static_cast<double>(cell) / (height * (next[0] - next[-1])));
+        *means++ =
+            static_cast<float>(static_cast<double>(cell) / ((bottom - top) * (next[0] - next[-1])));
         cell = 0;
         ++next;
       }
     }
   }
 }
-
-int tallest_row(const Grid& grid) { return grid.height / grid.rows + 1; }
 
 // The row of cells that begins with row `top` of the picture.
 int row_at(const Grid& grid, int top) {
@@ -100,42 +140,18 @@ int row_at(const Grid& grid, int top) {
 }  // namespace
 
 void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
-  means_of_rows(grid, 0, grid.rows, plane, 0, means);
-}
-
-// Of channels 1 and 2, a row of cells at a time.
-void find_shared_cells(const Grid& grid, const KeptPicture& picture, GridFrames* cells, int frame,
-                       uint8_t* room) {
-  const auto width = static_cast<size_t>(grid.width);
-  const size_t most = width * static_cast<size_t>(tallest_row(grid));
-  RowReader reader(picture, grid.width, room);
-  uint8_t* const block = room + 2 * width;
-  for (int row = 0; row < grid.rows; ++row) {
-    const int top = grid.top(row), bottom = grid.top(row + 1);
-    for (int y = top; y < bottom; ++y) {
-      const uint8_t* rows[kChannels];
-      reader.read(y, rows);
-      for (size_t c = 1; c < kChannels; ++c)
-        std::memcpy(block + (c - 1) * most + static_cast<size_t>(y - top) * width, rows[c], width);
-    }
-    for (int c = 1; c < kChannels; ++c)
-      means_of_rows(grid, row, row + 1, block + static_cast<size_t>(c - 1) * most, top,
-                    cells->plane(frame, c) + ptrdiff_t{row} * grid.cols);
-  }
-}
-
-size_t cells_room(const Grid& grid) {
-  return 2 * static_cast<size_t>(grid.width) * (1 + static_cast<size_t>(tallest_row(grid)));
+  means_of_rows(grid, 0, grid.rows, {plane}, means);
 }
 
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame, uint8_t* room) {
+                    GridFrames* cells, int frame) {
   const int first = row_at(grid, band.own_first()), end = row_at(grid, band.own_end());
-  const bool shared = picture.shape.is_shared();
-  for (int c = 0; c < (shared ? 1 : kChannels); ++c)
-    means_of_rows(grid, first, end, picture.plane[c], band.first(),
-                  cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
-  if (shared) find_shared_cells(grid, picture, cells, frame, room);
+  for (int c = 0; c < kChannels; ++c) {
+    Samples samples = {picture.plane[c], band.first()};
+    if (c > 0 && picture.shape.is_shared())
+      samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
+    means_of_rows(grid, first, end, samples, cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
+  }
 }
 
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame) {

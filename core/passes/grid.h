@@ -59,10 +59,9 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
 // The same of all channels of a picture into picture `frame` of `cells`, where the picture has the
 // band's rows only: the cells of its own rows. Bands end where rows of cells do, and their pictures
-// share no samples. room: where pixels share samples, as many bytes; else it may be null.
+// share no samples.
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame, uint8_t* room = nullptr);
-size_t cells_room(const Grid& grid);
+                    GridFrames* cells, int frame);
 // All members have the cells that each of them found, for good.
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame);
 

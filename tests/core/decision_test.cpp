@@ -40,17 +40,19 @@ struct Decided {
       : model(model_of(background, limit)),
         decision(background.width, background.height, colours, steps, levels) {}
   const uint8_t* operator()(const Planes& frame, Pool* pool = nullptr) {
-    decision.decide({{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
-                     &model,
-                     threshold,
-                     limits ? model.limits() : nullptr},
-                    pool);
+    Comparison all = {{frame.level[0].data(), frame.level[1].data(), frame.level[2].data()},
+                      &model,
+                      threshold,
+                      limits ? model.limits() : nullptr};
+    all.shadows = shadows;
+    decision.decide(all, pool);
     return decision.mask();
   }
   BackgroundModel model;
   Decision decision;
   bool limits = true;  // of pixels
   double threshold = 18;
+  Shadows shadows = Shadows::background;
 };
 
 // A floor with a texture, in colours.
@@ -136,7 +138,7 @@ TEST(Light, IsNoForeground) {
         }
     for (Shadows shadows : {Shadows::background, Shadows::foreground, Shadows::marked}) {
       Decided decided(samples(floor), {}, colours, colours == Colours::yuv ? kLimited : Levels{});
-      decided.decision.set_shadows(shadows);
+      decided.shadows = shadows;
       const uint8_t* mask = decided(samples(frame));
       size_t inside = 0, dark = 0, marked = 0;
       for (int y = 0; y < 240; ++y)

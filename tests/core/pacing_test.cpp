@@ -288,6 +288,26 @@ TEST(Pacing, AFlushAtAnyFrameForgetsEverything) {
   });
 }
 
+// As many as come meanwhile.
+TEST(Pacing, FramesOfASolveAreItsTimeTimesTheRate) {
+  EngineOptions options;
+  options.method = Method::qdmd;
+  options.window_size = 100;
+  const auto late = [&](double rate, int width, int height) {
+    options.frame_rate = rate;
+    return layout_of(options, width, height).late_frames;
+  };
+  // The solve of such a window takes 0.02 s, and has four times as long.
+  EXPECT_EQ(late(24, 8, 8), 2);
+  EXPECT_EQ(late(49, 8, 8), 4);
+  EXPECT_EQ(late(99, 8, 8), 8);
+  EXPECT_EQ(late(1e6, 1, 1), options.window_size / 4);
+  // Solves that take a small part of a frame's time are done at once.
+  EXPECT_EQ(late(10, 8, 8), 0);
+  options.window_size = 20;
+  EXPECT_EQ(late(25, 320, 240), 0);
+}
+
 // Where there is no room for the frames that come during a solve, it has less time.
 TEST(Pacing, LittleMemoryTakesFromTheFramesOfASolve) {
   auto options = Both::late(kKinds[0], 1);

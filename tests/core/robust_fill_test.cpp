@@ -370,6 +370,12 @@ TEST(RefineGain, StaysWhereTooLittleFits) {
   EXPECT_EQ(refine_gain(c.reference, c.x().data(), kSameLight, 1), kSameLight);
 }
 
+TEST(RefineGain, OneStepOfLightInOnePixelIsEnough) {
+  Gain gain = {1.5f, 0.5f, 1};
+  EXPECT_TRUE(refine_gain({1, 1, 0, 1, 2, 0, 1, 1}, &gain));
+  EXPECT_EQ(gain, (Gain{1, 0.5f, 1}));
+}
+
 // ---- Blur ----
 
 TEST(Blur, IsTheMeanOfFiveByFive) {

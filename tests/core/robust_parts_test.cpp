@@ -1,4 +1,5 @@
-// The parts of robust Q-DMD that work on a coarse grid, against the slow and obvious way.
+// The parts of robust Q-DMD that work on a coarse grid, but for the grid itself, against the slow
+// and obvious way.
 #include <numeric>
 
 #include "core/learn/robust/light.h"
@@ -59,59 +60,6 @@ struct PatchSum {
   }
   int similar() const { return static_cast<int>(3 * kSimilar * kStepsPerLevel) * cells; }
 };
-
-// ---- Cells ----
-
-TEST(Cells, CoverThePictureWithoutOverlap) {
-  for (int width : {1, 2, 47, 48, 71, 72, 73, 352, 1920})
-    for (int height : {1, 3, 48, 71, 240, 1080}) {
-      const Grid grid(width, height);
-      ASSERT_GE(grid.rows, 1);
-      ASSERT_GE(grid.cols, 1);
-      EXPECT_EQ(grid.top(0), 0);
-      EXPECT_EQ(grid.left(0), 0);
-      EXPECT_EQ(grid.top(grid.rows), height);
-      EXPECT_EQ(grid.left(grid.cols), width);
-      for (int row = 0; row < grid.rows; ++row) EXPECT_LT(grid.top(row), grid.top(row + 1));
-      for (int col = 0; col < grid.cols; ++col) EXPECT_LT(grid.left(col), grid.left(col + 1));
-    }
-}
-
-TEST(Cells, AreFewInThinPictures) {
-  for (int length : {100, 1000, 100000, 1 << 30})
-    for (int width : {1, 3, 50}) {
-      EXPECT_LE(Grid(length, width).cols, 2 * kMostCellsAlong);
-      EXPECT_LE(Grid(width, length).rows, 2 * kMostCellsAlong);
-    }
-}
-
-TEST(Cells, MeansAreThoseOfTheirPixels) {
-  // Thin pictures have cells of more rows than 16 bits can sum, and more columns than are summed
-  // together.
-  for (const auto& [width, height] :
-       {std::pair{1, 1}, {2, 5}, {47, 90}, {97, 73}, {352, 240}, {3, 200000}, {200000, 3}})
-    on_every_target([&, width = width, height = height] {
-      std::mt19937 rng(5);
-      const Grid grid(width, height);
-      const auto pixels = static_cast<size_t>(width * height);
-      BeforeTheEdge<uint8_t> plane(pixels);
-      for (uint8_t& sample : plane)
-        sample = static_cast<uint8_t>(height > 90 ? 255 - rng() % 9 : rng());
-      std::vector<float> means(grid.cells(), -1);
-      cell_means(grid, plane.data(), means.data());
-      for (int row = 0; row < grid.rows; ++row)
-        for (int col = 0; col < grid.cols; ++col) {
-          double sum = 0;
-          int count = 0;
-          for (int y = grid.top(row); y < grid.top(row + 1); ++y)
-            for (int x = grid.left(col); x < grid.left(col + 1); ++x, ++count)
-              sum += plane[static_cast<size_t>(y * width + x)];
-          // A sum of integers: exact.
-          ASSERT_EQ(means[static_cast<size_t>(row * grid.cols + col)],
-                    static_cast<float>(sum / count));
-        }
-    });
-}
 
 // ---- Patches ----
 

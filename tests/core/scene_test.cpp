@@ -256,8 +256,10 @@ TEST(Scene, RefusesOptionsOutOfRange) {
     refused(side, 8, 25, "16384");
     refused(8, side, 25, "16384");
   }
-  for (const double rate : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+  for (const double rate :
+       {0.0, -1.0, 9e-4, 1.1e6, std::nan(""), std::numeric_limits<double>::infinity()})
     refused(8, 8, rate, "frames_per_second");
+  for (const double rate : {1e-3, 1e6}) EXPECT_NO_THROW(Scene(options(8, 8, rate), "default"));
   EXPECT_NO_THROW(Scene(options(16384, 1), "default").render(3, kEverything));
   EXPECT_NO_THROW(Scene(options(1, 2000), "default").render(3, kEverything));
 }
