@@ -120,10 +120,11 @@ def main():
 
     every = list(places(wanted.only))
     random.Random(wanted.seed).shuffle(every)
-    every = every[:wanted.count]
     if wanted.missed:
         missed = set(wanted.missed.read_text().split('\n'))
         every = [place for place in every if f'MISSED: {described(*place)}' in missed]
+    else:
+        every = every[:wanted.count]
     noticed = 0
     for name, number, start, end, new in every:
         path = COPY / name

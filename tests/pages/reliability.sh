@@ -6,6 +6,7 @@
 #   build/tests/fuzz/fuzz-TARGET --random N --seed 77     a line each, by hand, in build/random.log
 #   build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
+#   tests/mutate.py --missed build/mutation.log >build/mutation-again.log
 #   tests/coverage.sh                                     leaves build-coverage/coverage.txt
 #
 # Where there is no log, the page says so.
@@ -44,7 +45,7 @@ lines_of() {
 block fuzz build-fuzz/{scene,learnt,dataset,core,element}.log
 block random build/random.log
 block soak build/soak.log
-block mutation build/mutation.log
+block mutation build/mutation.log build/mutation-again.log
 block coverage build-coverage/coverage.txt
 names=()
 for name in fuzz random soak mutation coverage; do names+=("$name=$results/$name.md"); done
