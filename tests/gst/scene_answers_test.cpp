@@ -118,8 +118,11 @@ TEST(SceneAnswers, FramesAreConvertedToTime) {
 TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
   const Element pipeline = pipeline_of("qdmdscenesrc" + std::string(kCaps));
   ASSERT_TRUE(pipeline);
-  pause(pipeline);
-  EXPECT_FALSE(gst_element_seek(pipeline.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+  // Without a flush, after which GStreamer's base class would send no segment where it is refused.
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  ASSERT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+            GST_STATE_CHANGE_SUCCESS);
+  EXPECT_FALSE(gst_element_seek(pipeline.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_NONE,
                                 GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
