@@ -38,7 +38,7 @@ lines_of() {
       ;;
     coverage) grep -E '^TOTAL' "$2" ;;
     random) cat "$2" ;;
-    *) tail -n 40 "$2" ;;
+    *) tail -n 41 "$2" ;;
   esac | cut -c1-150
 }
 
