@@ -59,6 +59,9 @@ using namespace qdmd::scene;
 
 constexpr gint kWidth = 320, kHeight = 240, kRate = 25;
 
+constexpr const char* kNoEnd =
+    "Backwards needs an end: seek with a stop position, or give the scene a length.";
+
 enum Truth { TRUTH_NONE, TRUTH_BACKGROUND, TRUTH_MASK, TRUTH_LABELS };
 
 struct Settings {
@@ -73,6 +76,7 @@ struct Private {
   Settings settings;
   GstVideoInfo told_info;  // what queries are answered from; frame rate 0: not negotiated
   gint64 told_length = 0;
+  GstClockTime told_stop = GST_CLOCK_TIME_NONE;  // of the last seek
 
   // Protected by the stream lock.
   Settings playing;
@@ -309,7 +313,6 @@ static gboolean gst_qdmd_scene_src_start(GstBaseSrc* source) {
   Private* priv = self->priv;
   GST_OBJECT_LOCK(self);
   priv->playing = priv->settings;
-  gst_video_info_init(&priv->told_info);
   GST_OBJECT_UNLOCK(self);
   priv->pending.reset();
   priv->index = priv->first_index = 0;
@@ -323,7 +326,12 @@ static gboolean gst_qdmd_scene_src_start(GstBaseSrc* source) {
 }
 
 static gboolean gst_qdmd_scene_src_stop(GstBaseSrc* source) {
-  GST_QDMD_SCENE_SRC(source)->priv->scene.reset();
+  Private* priv = GST_QDMD_SCENE_SRC(source)->priv;
+  priv->scene.reset();
+  GST_OBJECT_LOCK(source);
+  gst_video_info_init(&priv->told_info);
+  priv->told_stop = GST_CLOCK_TIME_NONE;
+  GST_OBJECT_UNLOCK(source);
   return TRUE;
 }
 
@@ -369,9 +377,44 @@ static bool locate(Private* priv, const GstSegment& segment) {
   return true;
 }
 
+// True for a seek backwards in a scene that has no end, where the seek gives none. do_seek would
+// refuse it, too, but that is too late: the base class has flushed by then, and sends no segment.
+static bool refuses(GstQdmdSceneSrc* self, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK) return false;
+  gdouble rate;
+  GstSeekType stop_type;
+  gint64 stop;
+  gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, &stop_type, &stop);
+  GST_OBJECT_LOCK(self);
+  const bool endless =
+      GST_VIDEO_INFO_FPS_N(&self->priv->told_info) > 0 && self->priv->told_length == 0;
+  const bool stays = stop_type == GST_SEEK_TYPE_NONE;
+  const bool ends = stays ? GST_CLOCK_TIME_IS_VALID(self->priv->told_stop)
+                          : stop_type == GST_SEEK_TYPE_SET && stop >= 0;
+  GST_OBJECT_UNLOCK(self);
+  if (rate >= 0 || !endless || ends) return false;
+  GST_WARNING_OBJECT(self, "%s", kNoEnd);
+  return true;
+}
+
+static gboolean gst_qdmd_scene_src_event(GstBaseSrc* source, GstEvent* event) {
+  return !refuses(GST_QDMD_SCENE_SRC(source), event) &&
+         GST_BASE_SRC_CLASS(parent_class)->event(source, event);
+}
+
+static gboolean gst_qdmd_scene_src_send_event(GstElement* element, GstEvent* event) {
+  if (!refuses(GST_QDMD_SCENE_SRC(element), event))
+    return GST_ELEMENT_CLASS(parent_class)->send_event(element, event);
+  gst_event_unref(event);
+  return FALSE;
+}
+
 static gboolean gst_qdmd_scene_src_do_seek(GstBaseSrc* source, GstSegment* segment) {
   Private* priv = GST_QDMD_SCENE_SRC(source)->priv;
   segment->time = segment->start;
+  GST_OBJECT_LOCK(source);
+  priv->told_stop = segment->stop;
+  GST_OBJECT_UNLOCK(source);
   if (priv->scene) return locate(priv, *segment);
   priv->pending = *segment;
   return TRUE;
@@ -400,9 +443,7 @@ static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
     priv->scene.emplace(options, priv->effects);
     priv->yuv.reset();
     if (!GST_VIDEO_INFO_IS_RGB(&info)) priv->yuv.emplace(info);
-    if (priv->pending && !locate(priv, *priv->pending))
-      throw std::invalid_argument(
-          "Backwards needs an end: seek with a stop position, or give the scene a length.");
+    if (priv->pending && !locate(priv, *priv->pending)) throw std::invalid_argument(kNoEnd);
     priv->pending.reset();
     GST_OBJECT_LOCK(self);
     priv->told_info = info;
@@ -568,6 +609,8 @@ static void gst_qdmd_scene_src_class_init(GstQdmdSceneSrcClass* klass) {
   source_class->set_caps = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_set_caps);
   source_class->decide_allocation = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_decide_allocation);
   source_class->is_seekable = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_is_seekable);
+  element_class->send_event = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_send_event);
+  source_class->event = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_event);
   source_class->do_seek = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_do_seek);
   source_class->query = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_query);
   source_class->get_times = GST_DEBUG_FUNCPTR(gst_qdmd_scene_src_get_times);

@@ -2,6 +2,7 @@
 #include <gst/gst.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -114,16 +115,45 @@ TEST(SceneAnswers, FramesAreConvertedToTime) {
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 
-// Of a scene without a length.
+// Asks the source itself, or the pipeline, whose sink passes it on.
+gboolean seek_backwards(GstElement* element, GstSeekType stop_type, GstClockTime stop) {
+  return gst_element_seek(element, -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET, 0,
+                          stop_type, gint64(stop));
+}
+
+// Of a scene without a length. It is refused before anything is flushed: after a flush, frames
+// would lack their segment.
 TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
-  const Element pipeline = pipeline_of("qdmdscenesrc" + std::string(kCaps));
+  const Element pipeline = pipeline_of("qdmdscenesrc name=source" + std::string(kCaps));
   ASSERT_TRUE(pipeline);
-  // Without a flush, after which GStreamer's base class would send no segment where it is refused.
-  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-  ASSERT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
-            GST_STATE_CHANGE_SUCCESS);
-  EXPECT_FALSE(gst_element_seek(pipeline.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_NONE,
-                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
+  pause(pipeline);
+  const Element source(gst_bin_get_by_name(GST_BIN(pipeline.get()), "source"));
+  const std::unique_ptr<GstPad, Unref> pad(gst_element_get_static_pad(source.get(), "src"));
+  std::atomic<int> flushes = 0;
+  const auto count = [](GstPad*, GstPadProbeInfo* info, gpointer data) {
+    if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_START)
+      ++*static_cast<std::atomic<int>*>(data);
+    return GST_PAD_PROBE_OK;
+  };
+  gst_pad_add_probe(pad.get(), GST_PAD_PROBE_TYPE_EVENT_FLUSH, count, &flushes, nullptr);
+  for (GstElement* asked : {pipeline.get(), source.get()}) {
+    EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_NONE, GST_CLOCK_TIME_NONE));
+    EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_SET, GST_CLOCK_TIME_NONE));
+    EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_END, 0));
+  }
+  EXPECT_EQ(flushes, 0);
+  EXPECT_TRUE(seek_backwards(pipeline.get(), GST_SEEK_TYPE_SET, GST_SECOND));
+  EXPECT_EQ(flushes, 1);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+// The stop that an earlier seek gave is an end.
+TEST(SceneAnswers, BackwardsFromTheLastStopIsTaken) {
+  const Element pipeline = pipeline_of("qdmdscenesrc name=source" + std::string(kCaps));
+  ASSERT_TRUE(pipeline);
+  pause(pipeline);
+  EXPECT_TRUE(seek_backwards(pipeline.get(), GST_SEEK_TYPE_SET, GST_SECOND));
+  EXPECT_TRUE(seek_backwards(pipeline.get(), GST_SEEK_TYPE_NONE, GST_CLOCK_TIME_NONE));
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 
