@@ -277,7 +277,7 @@ def killed_and_resumed(folder):
                 os.kill(process, signal.SIGKILL)
             except ProcessLookupError:
                 pass
-        job.wait(60)
+        job.wait(300)
         progress = folder / 'killed.png.progress'
         resumed += progress.exists() and json.loads(progress.read_text())['windows'] > 0
         whole_so_far(folder, 'killed')
@@ -296,7 +296,7 @@ def resumed_with_other_options(folder):
         time.sleep(0.01)
     for process in descendants(job.pid):
         os.kill(process, signal.SIGKILL)
-    job.wait(60)
+    job.wait(300)
     text = run(folder, 1, clip, *outputs(folder, 'other'), '--window', 12, '--resume', expect=1)
     assert 'other options' in text, text
 
