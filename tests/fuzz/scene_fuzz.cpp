@@ -1,4 +1,6 @@
 // Fuzz target: a scene's text is read, or refused with a sentence; what is read is drawn.
+// cases/scene has each preset and effect to begin with: after 17 bytes that ask for a drawing comes
+// its name.
 #include <cmath>
 #include <stdexcept>
 #include <vector>
