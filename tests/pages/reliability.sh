@@ -7,6 +7,7 @@
 #   build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
 #   tests/mutate.py --missed build/mutation.log >build/mutation-again.log
+#   tests/mutate.py --count 40 --seed 2 >build/mutation-2.log
 #   tests/coverage.sh                                     leaves build-coverage/coverage.txt
 #
 # Where there is no log, the page says so.
@@ -45,7 +46,7 @@ lines_of() {
 block fuzz build-fuzz/{scene,learnt,dataset,core,element}.log
 block random build/random.log
 block soak build/soak.log
-block mutation build/mutation.log build/mutation-again.log
+block mutation build/mutation{,-again,-2}.log
 block coverage build-coverage/coverage.txt
 names=()
 for name in fuzz random soak mutation coverage; do names+=("$name=$results/$name.md"); done
