@@ -194,5 +194,38 @@ TEST(SceneWatch, OfTinyPicturesSaysNothing) {
   for (int t = 0; t < 20; ++t) EXPECT_EQ(watch.follow(a, b), SceneSeen::same);
 }
 
+// A camera that comes from a bare wall to a street: nothing of the background can be missed, and
+// all of the frame is new.
+TEST(SceneWatch, ABareWallIsLeftWhereEdgesComeNearlyEverywhere) {
+  const Grid grid = grid_of(32, 32);
+  constexpr int kTile = 8;
+  // So many tiles of 16 have edges; their places do not matter.
+  const auto noticed_after = [&](int tiles) {
+    std::mt19937 rng(7);
+    GridFrames frames(grid, 2);
+    for (int c = 0; c < 3; ++c)
+      for (size_t cell = 0; cell < grid.cells(); ++cell) {
+        const size_t row = cell / 32, col = cell % 32;
+        const size_t tile = row / kTile * 4 + col / kTile;
+        frames.plane(0, c)[cell] = 100;
+        const bool inside = row % kTile < kTile - 2 && col % kTile < kTile - 2;
+        const bool edged = inside && tile < static_cast<size_t>(tiles);
+        frames.plane(1, c)[cell] = edged ? static_cast<float>(40 + rng() % 160) : 100;
+      }
+    const float* wall[3];
+    const float* street[3];
+    for (int c = 0; c < 3; ++c) wall[c] = frames.plane(0, c), street[c] = frames.plane(1, c);
+    SceneWatch watch(grid);
+    for (int t = 1; t <= 2 * SceneWatch::kFrames; ++t)
+      if (watch.follow(street, wall) == SceneSeen::another) return t;
+    return 0;
+  };
+  EXPECT_EQ(noticed_after(16), SceneWatch::kFrames);
+  EXPECT_EQ(noticed_after(14), SceneWatch::kFrames);
+  // Somebody stands before the wall.
+  EXPECT_EQ(noticed_after(13), 0);
+  EXPECT_EQ(noticed_after(4), 0);
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "core/dmd/decompose.h"
 #include "tests/core/test_util.h"
 
 namespace qdmd::test {
@@ -90,6 +91,27 @@ TEST(ChannelDmd, EqualsAlgorithm1OnPixels) {
     }
   }
   EXPECT_GE(several_modes, 20);
+}
+
+// What is told of a window is told of the channel that changes most: one that stands still beside
+// it must not hide that.
+TEST(ChannelDmd, TheChannelThatChangesMostSpeaksForAll) {
+  for (size_t changing = 0; changing < 3; ++changing) {
+    SCOPED_TRACE("channel " + std::to_string(changing));
+    Clip clip(64, 12);
+    for (size_t t = 0; t < clip.size(); ++t)
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t p = 0; p < clip.pixels; ++p)
+          clip.set(t, c, p,
+                   (50 + 3.0 * static_cast<double>(p)) * (c == changing ? std::pow(0.9, t) : 1));
+    const auto gram = gram_of(to_window(clip));
+    DmdOptions options;
+    options.rank = 1;
+    const double omega =
+        channel_dmd(channel_gram(gram, static_cast<int>(changing)), options).summary.omega;
+    ASSERT_NEAR(omega, -std::log(0.9), 0.01);  // whole levels are not quite 0.9 of each other
+    EXPECT_EQ(decompose_channels(gram, options).summary.omega, omega);
+  }
 }
 
 }  // namespace
