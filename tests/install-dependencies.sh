@@ -28,7 +28,7 @@ docs=(python3 python3-matplotlib)
 opencv=(python3-numpy python3-opencv)
 fuzz=(clang)
 tidy=(clang-tidy)
-coverage=(gcovr)
+coverage=(clang llvm)
 # The compiler for 64-bit ARM, its C library, and what runs its programs.
 neon=(make g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
 

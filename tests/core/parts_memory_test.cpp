@@ -55,7 +55,7 @@ class PartsMemory : public testing::TestWithParam<Size> {
 };
 
 TEST_P(PartsMemory, OfAPicture) {
-  const auto [width, height] = GetParam();
+  const int width = GetParam().width, height = GetParam().height;
   const Grid grid(width, height);
   expect("SceneWatch", SceneWatch::bytes(grid), [&] { SceneWatch part(grid); });
   expect("StandingLooks", StandingLooks::bytes(grid), [&] { StandingLooks part(grid); });

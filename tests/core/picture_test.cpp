@@ -51,7 +51,8 @@ TEST(SplitChannels, SamplesGoToAllPixelsThatShareThem) {
 
 TEST(SplitChannels, SeesAlphaOfEveryLayout) {
   for (const VideoLayout& layout : kVideoLayouts)
-    for (const auto& [width, height] : kVideoSizes) {
+    for (const auto& size : kVideoSizes) {
+      const int width = size.first, height = size.second;
       VideoPicture frame(layout, width, height, 3);
       if (!frame.has(3)) continue;
       std::vector<uint8_t> planes(static_cast<size_t>(3 * width * height));

@@ -4,7 +4,7 @@
 #   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log; those of several
 #                                                         runs may be joined to one
 #   build/tests/fuzz/fuzz-TARGET --random N --seed 77     a line each, by hand, in build/random.log
-#   build/tests/soak/soak --long >build/soak.log
+#   GST_PLUGIN_PATH=build/gst build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
 #   tests/mutate.py --missed build/mutation.log >build/mutation-again.log
 #   tests/mutate.py --count 40 --seed 2 >build/mutation-2.log
