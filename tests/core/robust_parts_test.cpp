@@ -93,7 +93,7 @@ TEST(Patches, DensityIsThatOfTheDoubleLoop) {
                 static_cast<float>(alike) /
                 static_cast<float>(PatchSum(grid, frames, t, t, y, x).similar());
           }
-      on_every_target([&] {
+      on_every_target([&, rows = rows, cols = cols] {
         BeforeTheEdge<float> density(expected.size());
         std::fill(density.begin(), density.end(), -1.0f);
         PatchFrames(grid, frames, count, &pool).density(count, &pool, density.data());
@@ -149,7 +149,7 @@ TEST(Patches, DistanceIsThatOfTheDoubleLoop) {
       const GridFrames frames = related_frames(grid, known, rng);
       std::vector<int> reference(grid.cells());
       for (int& t : reference) t = static_cast<int>(rng() % static_cast<unsigned>(known));
-      on_every_target([&] {
+      on_every_target([&, rows = rows, cols = cols, count = count] {
         BeforeTheEdge<uint16_t> distance(grid.cells() * static_cast<size_t>(count));
         patch_distance(grid, frames, count, reference.data(), &pool, distance.data());
         for (int cell = 0; cell < rows * cols; ++cell)

@@ -99,7 +99,9 @@ TEST(DeepFormats, DifferInTheirLayoutOnly) {
           const std::string properties =
               std::string("window-size=6 foreground-threshold=20 ") + "output=" + output + more;
           SCOPED_TRACE(properties);
-          const auto info = [&](GstVideoFormat format) { return info_of(format, width, height); };
+          const auto info = [width = width, height = height](GstVideoFormat format) {
+            return info_of(format, width, height);
+          };
           const GstVideoInfo rgba = info(GST_VIDEO_FORMAT_RGBA64_LE),
                              argb = info(GST_VIDEO_FORMAT_ARGB64),
                              grey = info(GST_VIDEO_FORMAT_GRAY16_LE);
