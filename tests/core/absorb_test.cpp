@@ -127,5 +127,69 @@ TEST_P(Absorb, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(white_of(bag(), one, 100), white_of(bag(), three, 100));
 }
 
+// Frames of 10 bits, all channels the same: every level is half a level off those of 8 bits. What
+// takes a place in the background, and what comes back to it, has the depth of the frames.
+TEST_P(Absorb, KeepsTheDepthOfFrames) {
+  constexpr int kUnit = 4;
+  EngineOptions options = this->options();
+  options.depth = 10;
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  engine.set_absorb_frames(120);
+  std::mt19937 rng(912);
+  std::normal_distribution<double> noise(0, 0.4);
+  std::vector<uint8_t> bytes(2 * kPixels);
+  BasicImageView<uint8_t> view;
+  view.width = kWidth, view.height = kHeight;
+  view.bits = {10, 0};
+  view.pixel_stride = 2, view.row_stride = 2 * kWidth;
+  for (auto& channel : view.channel) channel = bytes.data();
+  BasicImageView<const uint8_t> in;
+  in.width = view.width, in.height = view.height, in.bits = view.bits;
+  in.pixel_stride = view.pixel_stride, in.row_stride = view.row_stride;
+  for (auto& channel : in.channel) channel = bytes.data();
+
+  const auto truth = [](bool with_bag, int x, int y) {
+    return 0.5 + (with_bag && in_bag(x, y) ? 30 + (x + y) % 7 : floor_level(0, x, y));
+  };
+  int seen = 0, compared = 0;
+  const auto take = [&] {
+    for (; engine.ready(); ++seen) {
+      engine.pop(Output::background, view);
+      constexpr int kSlack = 25;
+      const bool absorbed = seen >= kFrom + 120 + kSlack && seen < kUntil;
+      const bool uncovered = seen >= kUntil + 20;
+      if (!absorbed && !uncovered) continue;
+      double error = 0;
+      for (int y = 22; y < 42; ++y)
+        for (int x = 42; x < 62; ++x) {
+          const uint8_t* at = bytes.data() + 2 * (y * kWidth + x);
+          const double level = static_cast<double>(at[0] | at[1] << 8) / kUnit;
+          error += std::abs(level - truth(absorbed, x, y)) / 400;
+        }
+      // A median of a few frames; a level of 8 bits would be off by 0.5.
+      EXPECT_LT(error, 0.35) << seen;
+      ++compared;
+    }
+  };
+  for (int t = 0; t < kFrames; ++t) {
+    const int left = 2 * (t % 80) - 20;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        double level = truth(t >= kFrom && t < kUntil, x, y);
+        if (x >= left && x < left + 8 && y < 50) level = 230;
+        const auto sample = static_cast<int>(std::lround(kUnit * (level + noise(rng))));
+        bytes[static_cast<size_t>(2 * (y * kWidth + x))] = static_cast<uint8_t>(sample & 255);
+        bytes[static_cast<size_t>(2 * (y * kWidth + x) + 1)] = static_cast<uint8_t>(sample >> 8);
+      }
+    ASSERT_TRUE(engine.push(in).ok());
+    take();
+  }
+  ASSERT_TRUE(engine.drain().ok());
+  take();
+  EXPECT_EQ(seen, kFrames);
+  EXPECT_GT(compared, 100);
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -461,5 +461,43 @@ TEST(DeepEngine, RefusesFramesOfAnotherDepth) {
   }
 }
 
+// ---- What is told of a solve ----
+
+// Samples whose low bits are zero are those of 8 bits: what is told in levels is the same.
+TEST(DeepSpectrum, IsInLevels) {
+  for (int depth : {10, 12, 16}) {
+    std::mt19937 rng(37);
+    const auto narrow = make_frames(8, rng);
+    SolveReport of_depth[2];
+    for (bool deep : {false, true}) {
+      EngineOptions options = options_of(deep ? depth : 8, Method::qdmd, kFrames);
+      options.dmd.spectrum = true;
+      Engine engine;
+      ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+      for (Frame frame : narrow) {
+        DeepPicture picture({deep ? depth : 8, 0}, true);
+        if (deep)
+          for (int& sample : frame) sample <<= depth - 8;
+        picture.fill(frame);
+        BasicImageView<const uint8_t> in = picture.view<const uint8_t>();
+        ASSERT_TRUE(engine.push(in).ok());
+      }
+      ASSERT_TRUE(engine.drain().ok());
+      of_depth[deep] = engine.report();
+    }
+    const auto& a = of_depth[0].dmd.spectrum;
+    const auto& b = of_depth[1].dmd.spectrum;
+    ASSERT_TRUE(a && b);
+    ASSERT_EQ(a->size(), size_t{kFrames - 1});
+    ASSERT_EQ(a->size(), b->size());
+    // The same Gram matrix but for a power of two.
+    for (size_t k = 0; k < a->size(); ++k) {
+      EXPECT_EQ((*a)[k].lambda, (*b)[k].lambda);
+      EXPECT_EQ((*a)[k].background, (*b)[k].background);
+      EXPECT_DOUBLE_EQ((*a)[k].amplitude, (*b)[k].amplitude);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -3,6 +3,8 @@
 #include <gst/video/gstvideometa.h>
 
 #include <atomic>
+#include <cmath>
+#include <complex>
 #include <thread>
 
 #include "tests/gst/watched_element.h"
@@ -65,6 +67,60 @@ TEST(Messages, NoneWithoutBeingAskedAndAnyTime) {
   element.set("post-messages", FALSE);
   stream.push_many(8, 4);
   EXPECT_TRUE(element.messages().empty());
+}
+
+TEST(Messages, HaveTheSpectrumThatIsAskedFor) {
+  for (const bool asked : {false, true}) {
+    Stream stream(std::string("qdmdbackground method=qdmd window-size=8 omega-threshold=0.1 "
+                              "post-messages=true spectrum=") +
+                      (asked ? "true" : "false"),
+                  GST_VIDEO_FORMAT_RGB, 40, 24);
+    Element element(stream);
+    stream.push_many(0, 8);
+    const auto messages = element.messages();
+    ASSERT_EQ(1u, messages.size());
+    const GstStructure* s = gst_message_get_structure(messages[0]);
+    const char* const names[] = {"eigenvalues-real", "eigenvalues-imaginary", "amplitudes",
+                                 "background"};
+    for (const char* name : names) EXPECT_EQ(asked, gst_structure_has_field(s, name)) << name;
+    if (asked) {
+      const auto array = [&](const char* name) { return gst_structure_get_value(s, name); };
+      const auto number = [&](const char* name, guint k) {
+        return g_value_get_double(gst_value_array_get_value(array(name), k));
+      };
+      for (const char* name : names) ASSERT_EQ(7u, gst_value_array_get_size(array(name))) << name;
+      // The nearest to the origin first, which the message is about.
+      double real = 0, imaginary = 0, before = 0;
+      guint background = 0, modes = 0;
+      ASSERT_TRUE(gst_structure_get(s, "lambda-real", G_TYPE_DOUBLE, &real, "lambda-imaginary",
+                                    G_TYPE_DOUBLE, &imaginary, nullptr));
+      GstStructure* stats = nullptr;
+      g_object_get(element.get(), "stats", &stats, nullptr);
+      ASSERT_TRUE(gst_structure_get_uint(stats, "background-modes", &modes));
+      for (const char* name : names)
+        EXPECT_EQ(GST_VALUE_EQUAL,
+                  gst_value_compare(array(name), gst_structure_get_value(stats, name)));
+      gst_structure_free(stats);
+      EXPECT_EQ(real, number(names[0], 0));
+      EXPECT_EQ(imaginary, number(names[1], 0));
+      for (guint k = 0; k < 7; ++k) {
+        const std::complex<double> lambda(number(names[0], k), number(names[1], k));
+        const double omega = std::abs(std::log(lambda));
+        EXPECT_GE(omega, before) << k;
+        before = omega;
+        EXPECT_GE(lambda.imag(), 0) << k;
+        EXPECT_GE(number(names[2], k), 0) << k;
+        const bool chosen =
+            g_value_get_boolean(gst_value_array_get_value(array(names[3]), k)) != FALSE;
+        EXPECT_EQ(k == 0 || omega <= 0.1, chosen) << k;
+        background += chosen;
+      }
+      EXPECT_EQ(modes, background);
+      // The floor of the scene is far brighter than what moves before it.
+      EXPECT_GT(number(names[2], 0), number(names[2], 6));
+    }
+    gst_message_unref(messages[0]);
+  }
 }
 
 TEST(Messages, TimesFollowTheSegment) {

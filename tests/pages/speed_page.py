@@ -12,8 +12,11 @@ import page
 
 TURNS = 5
 SIZES = ((320, 240, 700), (768, 576, 400), (1920, 1080, 150))
-BYTES = {'RGBA': 4, 'I420': 1.5, 'NV12': 1.5}
+BYTES = {'RGBA': 4, 'I420': 1.5, 'NV12': 1.5, 'P010_10LE': 3}
 MASK = 'qdmdbackground output=mask'
+LIVE = f'{MASK} mode=live'
+QDMD = f'{MASK} method=qdmd'
+CONVERTED = 'videoconvert ! video/x-raw,format=RGBA ! '
 # name: format, elements. Others are compared with the first one of their format.
 CASES = {
     'identity': ('RGBA', 'identity'),
@@ -21,16 +24,34 @@ CASES = {
     'default': ('RGBA', 'qdmdbackground'),
     'default, `output=mask`': ('RGBA', MASK),
     '`stabilize=off output=mask`': ('RGBA', f'{MASK} stabilize=off'),
-    '`mode=live output=mask`': ('RGBA', f'{MASK} mode=live'),
-    '`method=qdmd output=mask`': ('RGBA', f'{MASK} method=qdmd'),
+    '`mode=live output=mask`': ('RGBA', LIVE),
+    '`method=qdmd output=mask`': ('RGBA', QDMD),
     'I420 identity': ('I420', 'identity'),
-    'I420, `output=mask`': ('I420', MASK),
-    'I420 through videoconvert to RGBA, `output=mask`':
-        ('I420', f'videoconvert ! video/x-raw,format=RGBA ! {MASK}'),
-    'I420, `mode=live output=mask`': ('I420', f'{MASK} mode=live'),
+    'I420': ('I420', MASK),
+    'I420, videoconvert to RGBA before': ('I420', CONVERTED + MASK),
+    'I420, live': ('I420', LIVE),
+    'I420, live, videoconvert to RGBA before': ('I420', CONVERTED + LIVE),
     'NV12 identity': ('NV12', 'identity'),
-    'NV12, `output=mask`': ('NV12', MASK),
+    'NV12': ('NV12', MASK),
+    'NV12, videoconvert to RGBA before': ('NV12', CONVERTED + MASK),
+    'NV12, live': ('NV12', LIVE),
+    'NV12, live, videoconvert to RGBA before': ('NV12', CONVERTED + LIVE),
+    'NV12, `method=qdmd`': ('NV12', QDMD),
+    'P010_10LE identity': ('P010_10LE', 'identity'),
+    'P010_10LE': ('P010_10LE', MASK),
+    'P010_10LE, live': ('P010_10LE', LIVE),
+    'P010_10LE, `method=qdmd`': ('P010_10LE', QDMD),
 }
+
+
+def beside(name):
+    """What a row of formats is compared with."""
+    if 'videoconvert' in name:
+        return name.removesuffix(', videoconvert to RGBA before')
+    if name.startswith('P010_10LE'):
+        return name.replace('P010_10LE', 'NV12')
+    return {'': 'default, `output=mask`', ', live': '`mode=live output=mask`',
+            ', `method=qdmd`': '`method=qdmd output=mask`'}[name[4:]]
 
 
 def launch(pipeline):
@@ -57,8 +78,8 @@ def milliseconds(video, folder, width, height, frames):
         for name, (form, elements) in CASES.items():
             size = int(width * height * BYTES[form])
             path = raw(video, folder, form, width, height, frames)
-            source = (f'filesrc location={path} blocksize={size} ! rawvideoparse format={form.lower()} '
-                      f'width={width} height={height} framerate=25/1')
+            source = (f'filesrc location={path} blocksize={size} ! rawvideoparse '
+                      f'format={form.lower().replace("_", "-")} width={width} height={height} framerate=25/1')
             seconds[name].append(launch(f'{source} ! {elements} ! fakesink sync=false')
                                  * 1000 * size / os.path.getsize(path))
     median = {name: statistics.median(values) for name, values in seconds.items()}
@@ -71,7 +92,17 @@ if __name__ == '__main__':
     target, clip, results = sys.argv[1:]
     columns = [milliseconds(clip, results, *size) for size in SIZES]
     print(file=sys.stderr)
-    rows = [[name] + [f'{column[name]:.2f} ({column["segmentation"] / column[name]:.2f})'
-                      for column in columns] for name in columns[0]]
-    head = ['ms a frame (times as fast as `segmentation`)', *(f'{w}x{h}' for w, h, _ in SIZES)]
-    page.put(target, {'speed': page.table(head, rows)})
+    sizes = [f'{w}x{h}' for w, h, _ in SIZES]
+    rows = {name: [name] for name in columns[0]}
+    for name, row in rows.items():
+        to_rgba = CASES[name][0] == 'RGBA'
+        for column in columns:
+            ratio = (column['segmentation'] / column[name] if to_rgba else
+                     column[name] / column[beside(name)])
+            row.append(f'{column[name]:.2f} ({ratio:.2f})')
+    page.put(target, {
+        'speed': page.table(['ms a frame (times as fast as `segmentation`)', *sizes],
+                            [row for name, row in rows.items() if CASES[name][0] == 'RGBA']),
+        'speed-formats': page.table(['ms a frame, `output=mask` (times as long as)', *sizes],
+                                    [row for name, row in rows.items() if CASES[name][0] != 'RGBA']),
+    })
