@@ -38,6 +38,7 @@ while read -r object; do objects+=(-object "$object"); done < <(
     'for file; do ! readelf -SW "$file" 2>/dev/null | grep -q __llvm_covmap || echo "$file"; done' sh {} +)
 # Metrics are what the other tools measure with: not part of the element.
 only=(--ignore-filename-regex='(^|/)(tests|examples|metrics|usr)/')
+# It warns of functions with mismatched data: inline ones, in files that include and do not use them.
 {
   llvm-cov report "${objects[@]:1}" -instr-profile=coverage.profdata "${only[@]}" \
     -show-region-summary=false -show-branch-summary=false -show-functions=false
