@@ -38,7 +38,7 @@ TESTS = {
     'model': 'background learnt learnt_file engine_output live',
     'learn': 'robust_parts robust_memory absorb another_scene robust robust_fill sample_step freeze '
              'parts_memory memory',
-    'foreground': 'decision ignored soft_mask mask_passes picture engine_output regions parts_memory',
+    'foreground': 'decision ignored soft_mask mask_passes picture engine_output regions parts_memory band',
     'engine': 'engine engine_output pacing live_plan live live_schedule freeze time_budget learnt '
               'another_scene memory',
     'align': 'motion stabilize resample parts_memory',

@@ -488,6 +488,35 @@ TEST(Settings, WithoutEffectHaveNone) {
   EXPECT_EQ(pictures_of("method=dmd"), pictures_of("method=dmd solver=qr iterations=2"));
 }
 
+// A picture every ten seconds that calls itself 25 a second.
+TEST(Settings, AFramerateThatIsNotTrueIsWarnedOfOnce) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 16, 16);
+  GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
+  GstBus* bus = gst_bus_new();
+  gst_element_set_bus(element, bus);
+  const auto push_at = [&](GstClockTime time) {
+    BufferPtr frame = stream.make_frame(0, paint_mover);
+    GST_BUFFER_PTS(frame.get()) = time;
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), frame.release()));
+  };
+  // A film with a gap in it is ordinary.
+  for (GstClockTime t = 0; t < 20; ++t) push_at(t * kFrame + (t / 10) * 10 * GST_SECOND);
+  EXPECT_EQ("", next_text(bus, GST_MESSAGE_WARNING));
+  std::string texts[2];
+  for (std::string& text : texts) {
+    for (GstClockTime t = 0; t < 10; ++t) push_at(40 * GST_SECOND + t * 10 * GST_SECOND);
+    text = next_text(bus, GST_MESSAGE_WARNING);
+  }
+  EXPECT_NE(std::string::npos, texts[0].find("framerate")) << texts[0];
+  EXPECT_EQ("", texts[1]);
+  // No frame is lost for it.
+  ASSERT_TRUE(stream.eos());
+  EXPECT_EQ(40u, stream.take_all().size());
+  gst_element_set_bus(element, nullptr);
+  gst_object_unref(bus);
+  gst_object_unref(element);
+}
+
 TEST(Settings, ThatWaitForTheNextStartAreWarnedOfWhilePlaying) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 16, 16);
   GstElement* element = gst_harness_find_element(stream.harness(), "qdmdbackground");
