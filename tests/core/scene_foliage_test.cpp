@@ -85,6 +85,27 @@ TEST(SceneFoliage, LeavesKeepTheirHue) {
   EXPECT_GT(most, 0.98 * seen);
 }
 
+// How far leaves come out of their part of the picture says how far they move.
+TEST(SceneFoliage, ReachesAsFarAsTheWindTakesIt) {
+  Scene plain(options(kWidth, kHeight), "default");
+  constexpr int kEdge = kWidth * 40 / 100, kHalfLeaf = 9;
+  const auto covered = [&](const std::string& wind, int left, int right) {
+    Scene scene(options(kWidth, kHeight), "foliage=40:size=12" + wind);
+    double share = 0;
+    for (int64_t k = 0; k < 200; k += 20)
+      share += differing(shoot(&scene, k), shoot(&plain, k), left, 0, right, kHeight) / 10;
+    return share;
+  };
+  constexpr int kNear = kEdge + kHalfLeaf + 1, kFar = kNear + 30;
+  EXPECT_EQ(covered(":wind=0", kNear, kWidth), 0);
+  // At most 1.2 times 10 % of a side of 139 pixels.
+  EXPECT_GT(covered(":wind=10", kNear, kNear + 10), 0.02);
+  EXPECT_EQ(covered(":wind=10", kNear + 17, kWidth), 0);
+  // 40 % where nothing is said.
+  EXPECT_GT(covered("", kFar, kFar + 10), 0.02);
+  EXPECT_EQ(covered("", kFar, kWidth), covered(":wind=40", kFar, kWidth));
+}
+
 TEST(SceneFoliage, RestsInTheUpperLeftCornerOnly) {
   Scene scene(options(kWidth, kHeight), "foliage=100:size=6:wind=6:rest=4");
   const Shot first = shoot(&scene, 0, scene::kFrame);
