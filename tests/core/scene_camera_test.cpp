@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/scene/effects/sensor_noise.h"
+#include "core/scene/paint.h"
 #include "tests/core/scene_util.h"
 
 namespace qdmd::test {
@@ -258,6 +259,37 @@ TEST(SceneJitter, ThePictureIsShiftedByTheShift) {
     }
   }
   EXPECT_GT(farthest, 3);
+}
+
+// Between pixels of a plane that rises evenly, levels lie on that plane.
+TEST(CropTurned, InterpolatesBetweenPixels) {
+  constexpr int kCanvas = 60, kFrame = 31;
+  const double slope[3][2] = {{2, 1}, {-1.5, 2.25}, {0.25, -3}};
+  const double start[3] = {20, 100, 210};
+  const auto level = [&](int c, double x, double y) {
+    return start[c] + slope[c][0] * x + slope[c][1] * y;
+  };
+  scene::Picture canvas(kCanvas, kCanvas);
+  for (int y = 0; y < kCanvas; ++y)
+    for (int x = 0; x < kCanvas; ++x)
+      for (int c = 0; c < 3; ++c)
+        canvas.at(x, y)[c] = static_cast<uint8_t>(std::lround(level(c, x, y)));
+  scene::Picture frame(kFrame, kFrame);
+  for (double turn : {0.0, 0.003, -0.02, 0.4})
+    for (const auto& [left, top] : {std::pair{12.0, 14.0}, {12.25, 14.5}, {13.7, 12.9}}) {
+      crop_turned(canvas, left, top, turn, &frame);
+      constexpr double kMiddle = (kFrame - 1) / 2.0;
+      for (int y = 0; y < kFrame; ++y)
+        for (int x = 0; x < kFrame; ++x) {
+          const double u = x - kMiddle, v = y - kMiddle;
+          const double at_x = left + kMiddle + std::cos(turn) * u - std::sin(turn) * v,
+                       at_y = top + kMiddle + std::sin(turn) * u + std::cos(turn) * v;
+          // Two roundings of half a level, and of places to 1/256 pixel.
+          for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(frame.at(x, y)[c], level(c, at_x, at_y), 1.05)
+                << c << " at " << x << " " << y << ", turn " << turn;
+        }
+    }
 }
 
 }  // namespace
