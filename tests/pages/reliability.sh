@@ -7,7 +7,7 @@
 #   GST_PLUGIN_PATH=build/gst build/tests/soak/soak --long >build/soak.log
 #   tests/mutate.py --count 40 >build/mutation.log
 #   tests/mutate.py --missed build/mutation.log >build/mutation-again.log
-#   tests/mutate.py --count 40 --seed 2 >build/mutation-2.log
+#   tests/mutate.py --seed 2 >build/mutation-2.log, and so on
 #   tests/coverage.sh                                     leaves build-coverage/coverage.txt
 #
 # Where there is no log, the page says so.
@@ -39,6 +39,7 @@ lines_of() {
       ;;
     coverage) grep -E '^TOTAL' "$2" ;;
     random) cat "$2" ;;
+    mutation) grep -E '^MISSED|noticed$' "$2" ;;
     *) tail -n 41 "$2" ;;
   esac | cut -c1-150
 }
@@ -46,7 +47,7 @@ lines_of() {
 block fuzz build-fuzz/{scene,learnt,dataset,core,element}.log
 block random build/random.log
 block soak build/soak.log
-block mutation build/mutation{,-again,-2}.log
+block mutation build/mutation{,-again,-2,-2-again,-3,-3-again}.log
 block coverage build-coverage/coverage.txt
 names=()
 for name in fuzz random soak mutation coverage; do names+=("$name=$results/$name.md"); done
