@@ -41,7 +41,8 @@ std::optional<Progress> read_progress(const std::string& path) {
   if (!file) return std::nullopt;
   try {
     const auto json = nlohmann::json::parse(file);
-    return Progress{json.at("settings"), json.at("windows"), json.at("frames"), json.at("ended")};
+    return Progress{json.at("settings"), json.at("windows"), json.at("frames"), json.at("ended"),
+                    json.value("joined", false)};
   } catch (const nlohmann::json::exception&) {
     throw std::runtime_error(path +
                              " is not the progress of qdmd-archive: remove it to begin anew");
@@ -54,7 +55,8 @@ void write_progress(const std::string& path, const Progress& progress) {
     file << nlohmann::json{{"settings", progress.settings},
                            {"windows", progress.windows},
                            {"frames", progress.frames},
-                           {"ended", progress.ended}}
+                           {"ended", progress.ended},
+                           {"joined", progress.joined}}
                 .dump(2)
          << '\n';
     if (!file.flush()) throw std::runtime_error(path + " cannot be written: is the disk full?");

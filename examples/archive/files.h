@@ -18,7 +18,8 @@ void give_name(const std::string& path);
 struct Progress {
   std::string settings;  // what the files depend on; another job's are not gone on with
   int64_t windows = 0, frames = 0;
-  bool ended = false;  // no frame is left; the videos of windows are to be joined
+  bool ended = false;   // no frame is left; the videos of windows are to be joined
+  bool joined = false;  // they are, and what they were made of may be gone
 };
 
 // Of a file that is not there: none. Throws std::runtime_error where the file is something else.

@@ -294,8 +294,12 @@ class Job {
       const RecordingInfo info;
       outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
     }
-    outputs_->join(done_.windows);
-    // Whoever is killed from here on has all files, and may join them once more.
+    // Killed before this is known, the job joins all of them once more.
+    if (!done_.joined) {
+      outputs_->join(done_.windows);
+      done_.joined = true;
+      write_progress(progress_path_, done_);
+    }
     outputs_->remove_parts();
     fs::remove(progress_path_);
     encoding_ += since(start);

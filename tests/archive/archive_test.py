@@ -287,6 +287,30 @@ def killed_and_resumed(folder):
     print(f'# {resumed} of the killed jobs had finished windows', flush=True)
 
 
+def killed_while_parts_are_removed(folder):
+    """What the joined videos were made of is gone in part: they are whole all the same."""
+    clip = folder / 'long.mkv'
+    options = ['--window', 10, '--method', 'robust', '--quiet', '--resume']
+    job = subprocess.Popen(command(1, clip, *outputs(folder, 'joined'), *options),
+                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+    progress = folder / 'joined.png.progress'
+    known = None
+    while known is None and job.poll() is None:
+        known = progress.read_text() if progress.exists() else None
+        time.sleep(0.01)
+    assert job.wait(300) == 0 and known
+    whole = results(folder, 'joined')
+    state = json.loads(known)
+    state.update(windows=-(-LONG_FRAMES // 10), frames=LONG_FRAMES, ended=True, joined=True)
+    progress.write_text(json.dumps(state))
+    parts = folder / 'joined-mask.mkv.parts'
+    parts.mkdir()
+    (parts / '00000002.mkv').write_bytes(b'one of those that are left')
+    run(folder, 1, clip, *outputs(folder, 'joined'), *options)
+    compare(whole, results(folder, 'joined'), 'as it was')
+    assert not leftovers(folder, 'joined'), leftovers(folder, 'joined')
+
+
 def resumed_with_other_options(folder):
     clip = folder / 'long.mkv'
     job = subprocess.Popen(command(1, clip, *outputs(folder, 'other'), '--window', 10, '--quiet'),
@@ -369,8 +393,8 @@ def main():
              for method in ('qdmd', 'dmd', 'robust')]
     cases += [(check.__name__.replace('_', ' '), check)
               for check in (files_and_pictures, more_outputs, killed_and_resumed,
-                            resumed_with_other_options, memory_of_processes, failing_process,
-                            errors)]
+                            killed_while_parts_are_removed, resumed_with_other_options,
+                            memory_of_processes, failing_process, errors)]
     words = sys.argv[3:]
     cases = [case for case in cases if not words or any(word in case[0] for word in words)]
     with tempfile.TemporaryDirectory() as name:
