@@ -26,7 +26,7 @@ fi
 # Processes of one program add to one file.
 profiles="$PWD/$build/profiles"
 rm -rf "$profiles"
-# A test that fails, for want of speed, has run its lines all the same.
+# A test that fails has run its lines all the same.
 LLVM_PROFILE_FILE="$profiles/%2m.profraw" meson test -C "$build" --no-rebuild \
   --timeout-multiplier 10 --num-processes "$(nproc)" "${tests[@]}" || true
 

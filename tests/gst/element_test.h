@@ -137,4 +137,19 @@ class Stream {
   GstVideoInfo info_;
 };
 
+// What the next such message says; "" where there is none.
+inline std::string next_text(GstBus* bus, GstMessageType type) {
+  GstMessage* message = gst_bus_pop_filtered(bus, type);
+  if (!message) return "";
+  GError* error = nullptr;
+  if (type == GST_MESSAGE_ERROR)
+    gst_message_parse_error(message, &error, nullptr);
+  else
+    gst_message_parse_warning(message, &error, nullptr);
+  const std::string text = error->message;
+  g_error_free(error);
+  gst_message_unref(message);
+  return text;
+}
+
 }  // namespace qdmd::test

@@ -17,7 +17,7 @@ MASK = 'qdmdbackground output=mask'
 LIVE = f'{MASK} mode=live'
 QDMD = f'{MASK} method=qdmd'
 CONVERTED = 'videoconvert ! video/x-raw,format=RGBA ! '
-# name: format, elements. Others are compared with the first one of their format.
+# name: format, elements. The time of a format's identity is taken off its other rows.
 CASES = {
     'identity': ('RGBA', 'identity'),
     'segmentation': ('RGBA', 'segmentation method=mog2 test-mode=true'),
@@ -45,13 +45,13 @@ CASES = {
 
 
 def beside(name):
-    """What a row of formats is compared with."""
-    if 'videoconvert' in name:
-        return name.removesuffix(', videoconvert to RGBA before')
-    if name.startswith('P010_10LE'):
-        return name.replace('P010_10LE', 'NV12')
-    return {'': 'default, `output=mask`', ', live': '`mode=live output=mask`',
-            ', `method=qdmd`': '`method=qdmd output=mask`'}[name[4:]]
+    """What a row of formats is compared with: the same without a conversion, in 8 bits, or in RGBA."""
+    form, elements = CASES[name]
+    if elements.startswith(CONVERTED):
+        other = form, elements.removeprefix(CONVERTED)
+    else:
+        other = 'NV12' if form == 'P010_10LE' else 'RGBA', elements
+    return next(row for row, case in CASES.items() if case == other)
 
 
 def launch(pipeline):
