@@ -26,7 +26,7 @@ DenseSvd<Matrix> square_svd(const Matrix& m) {
   };
   DenseSvd<Matrix> result = as_result(Eigen::BDCSVD<Matrix>(m, kThin));
   const Real tolerance =
-      Real(100 * static_cast<double>(m.cols())) * std::numeric_limits<Real>::epsilon();
+      Real(8 * static_cast<double>(m.cols())) * std::numeric_limits<Real>::epsilon();
   const auto orthonormal = [&](const Matrix& q) {
     return (q.adjoint() * q - Matrix::Identity(q.cols(), q.cols())).norm() <= tolerance;
   };
