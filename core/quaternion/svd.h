@@ -17,6 +17,8 @@ struct DenseSvd {
 
 // Eigen's divide and conquer, checked: in Eigen 3.4 it is wrong by up to a million epsilon in a few
 // percent of the matrices that have clusters of singular values. Jacobi's method serves these.
+// Good results lie within 4 n epsilon, and few wrong ones below 16 n (34 and 24 of 500 lie above):
+// the check's 8 n is between them.
 template <typename Matrix>
 DenseSvd<Matrix> square_svd(const Matrix& m) {
   using Real = typename Matrix::RealScalar;
