@@ -42,6 +42,13 @@ void weigh_columns(const uint8_t* first, uint32_t less_first, const uint8_t* las
     sums[x] = shared * sums[x] - less_first * first[x] - less_last * last[x];
 }
 
+// Means of cells from sums up to their edges, which are integers: exact to the division.
+void divide_differences(const double* HWY_RESTRICT before, const double* HWY_RESTRICT across,
+                        double rows, size_t count, float* HWY_RESTRICT means) {
+  for (size_t i = 0; i < count; ++i)
+    means[i] = static_cast<float>((before[i + 1] - before[i]) / (rows * across[i]));
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace qdmd
 HWY_AFTER_NAMESPACE();
@@ -52,6 +59,7 @@ namespace {
 
 HWY_EXPORT(sum_columns);
 HWY_EXPORT(weigh_columns);
+HWY_EXPORT(divide_differences);
 
 }  // namespace
 
@@ -90,45 +98,39 @@ void sum_rows(const Grid& grid, const Samples& samples, int top, int bottom, int
    static_cast<size_t>(count), sums);
 }
 
-// The sum of pixels left .. right - 1 > left, of which `columns` share each of `sums`.
-uint64_t sum_pixels(const uint32_t* sums, int columns, int left, int right) {
-  const int begin = left / columns, last = (right - 1) / columns;
-  uint64_t sum = 0;
-  for (int s = begin; s <= last; ++s) sum += sums[s];
-  if (columns == 1) return sum;
-  return static_cast<uint64_t>(columns) * sum -
-         static_cast<uint64_t>(left - begin * columns) * sums[begin] -
-         static_cast<uint64_t>((last + 1) * columns - right) * sums[last];
-}
-
 // Of rows of cells first .. end - 1.
 void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& samples,
                    float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
   alignas(64) uint32_t sums[kColumns];
-  std::array<int, 2 * kMostCellsAlong + 1> left;
-  for (int col = 0; col <= grid.cols; ++col) left[static_cast<size_t>(col)] = grid.left(col);
-  const int most = kColumns * samples.columns;
-  for (int row = first_row; row < end_row; ++row) {
+  // Of pixels left of a cell's left edge; and the cells' widths.
+  std::array<double, 2 * kMostCellsAlong + 1> before, across;
+  const auto cols = static_cast<size_t>(grid.cols);
+  for (size_t col = 0; col < cols; ++col)
+    across[col] = grid.left(static_cast<int>(col) + 1) - grid.left(static_cast<int>(col));
+  const int shared = samples.columns, all = (grid.width + shared - 1) / shared;
+  before[0] = 0;
+  for (int row = first_row; row < end_row; ++row, means += cols) {
     const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
-    const int* next = left.data() + 1;  // where the cell ends
-    uint64_t cell = 0;
-    for (int first = 0; first < grid.width; first += most) {
-      const int count = std::min(most, grid.width - first);
-      sum_rows(grid, samples, top, bottom, first / samples.columns,
-               (count + samples.columns - 1) / samples.columns, sums);
-      // A cell may end in these columns or go on in the next.
-      for (int x = 0; x < count;) {
-        const int end = std::min(count, *next - first);
-        cell += sum_pixels(sums, samples.columns, x, end);
-        x = end;
-        if (first + x < *next) break;
-        *means++ =
-            static_cast<float>(static_cast<double>(cell) / ((bottom - top) * (next[0] - next[-1])));
-        cell = 0;
-        ++next;
+    uint64_t sum = 0;  // of the samples so far
+    int next = 1;
+    for (int first = 0; first < all; first += kColumns) {
+      const int count = std::min(kColumns, all - first);
+      sum_rows(grid, samples, top, bottom, first, count, sums);
+      int s = 0;
+      for (; next <= grid.cols; ++next) {
+        // The edge may part the pixels of a sample.
+        const int edge = grid.left(next), end = edge / shared - first, part = edge % shared;
+        if (end + (part > 0) > count) break;
+        for (; s < end; ++s) sum += sums[s];
+        before[static_cast<size_t>(next)] =
+            static_cast<double>(static_cast<uint64_t>(shared) * sum +
+                                (part > 0 ? static_cast<uint64_t>(part) * sums[end] : 0));
       }
+      for (; s < count; ++s) sum += sums[s];
     }
+    HWY_DYNAMIC_DISPATCH(divide_differences)
+    (before.data(), across.data(), bottom - top, cols, means);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "core/passes/median_block.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <utility>
 
@@ -19,13 +20,14 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr size_t kRun = kMedianBlock;
 // Whole vectors of every instruction set.
 constexpr size_t kUnit = 64;
+// The samples of a block, those of a channel behind those of the one before, to the end of vectors.
+constexpr size_t kSamples = 3 * kMedianBlock + kUnit;
 
 // The medians of rows of `count` samples, a multiple of kUnit; the mean of the middle two, rounded
 // up, where there are two. Leaves the samples in another order.
-void take_median(const MedianNetwork<16>& network, size_t count, uint8_t (*samples)[kRun],
+void take_median(const MedianNetwork<16>& network, size_t count, uint8_t (*samples)[kSamples],
                  uint8_t* median) {
   const hn::CappedTag<uint8_t, kUnit> d;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -57,7 +59,8 @@ namespace {
 HWY_EXPORT(take_median);
 HWY_EXPORT(scale_row);
 
-constexpr size_t kRun = kMedianBlock, kUnit = 64, kMost = 16;
+using HWY_NAMESPACE::kSamples, HWY_NAMESPACE::kUnit;
+constexpr size_t kRun = kMedianBlock, kMost = 16;
 static_assert(kMedianFrames <= kMost);
 using Network = MedianNetwork<kMost>;
 
@@ -88,44 +91,124 @@ void copy_row(const uint8_t* from, size_t count, uint8_t* to) {
     for (size_t i = 0; i < count; ++i) to[i] = from[i];
 }
 
+size_t padded(size_t count) { return (count + kUnit - 1) / kUnit * kUnit; }
+
+// Each byte twice, the first one first.
+uint64_t doubled(uint32_t bytes) {
+  uint64_t apart = bytes;
+  apart = (apart | apart << 16) & 0x0000FFFF0000FFFF;
+  apart = (apart | apart << 8) & 0x00FF00FF00FF00FF;
+  return apart | apart << 8;
+}
+// The first byte in memory is the lowest.
+static_assert(std::endian::native == std::endian::little);
+
+// Samples that two pixels of a row share, for each pixel of the block. Reads up to four bytes
+// behind the samples and writes up to eight behind the pixels.
+void spread_block(const MedianBlock& block, const uint8_t* samples, uint8_t* to) {
+  const size_t skipped = 8 * block.left, step = 8 - 2 * block.left;
+  for (size_t y = 0; y < block.height; ++y, to += block.width) {
+    const uint8_t* from = samples + (block.top + y) / block.rows * block.shared_width();
+    for (size_t x = 0; x < block.width; x += step, from += step / 2) {
+      uint32_t few;
+      std::memcpy(&few, from, sizeof(few));
+      const uint64_t pixels = doubled(few) >> skipped;
+      std::memcpy(to + x, &pixels, sizeof(pixels));
+    }
+  }
+}
+
+// The samples of a block, one channel behind the other.
+class BlockLayout {
+ public:
+  // shared: channels 1 and 2 have the samples that pixels share.
+  BlockLayout(const MedianBlock& block, bool shared) : block_(block), shared_(shared) {
+    for (size_t c = 0; c < kChannels; ++c)
+      begin_[c + 1] = begin_[c] + (is_shared(c) ? block.shared_width() * block.shared_height()
+                                                : block.width * block.height);
+  }
+  size_t begin(size_t channel) const { return begin_[channel]; }
+  size_t end(size_t channel) const { return begin_[channel + 1]; }
+  size_t all() const { return begin_[kChannels]; }
+  bool is_shared(size_t channel) const { return shared_ && channel > 0; }
+
+  // Writes a channel of a frame to its place; what lies behind it is lost.
+  void take(const MedianFrame& frame, size_t channel, uint8_t* samples) const {
+    uint8_t* const to = samples + begin(channel);
+    if (channel == 0 || !frame.is_shared) {
+      copy(frame, channel, block_.width, block_.height, to);
+    } else if (shared_) {
+      copy(frame, channel, block_.shared_width(), block_.shared_height(), to);
+    } else {
+      uint8_t few[kRun + sizeof(uint32_t)];
+      copy(frame, channel, block_.shared_width(), block_.shared_height(), few);
+      spread_block(block_, few, to);
+    }
+    if (const float factor = frame.inverse[channel]; factor != 1)
+      HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), factor, to);
+  }
+
+ private:
+  static void copy(const MedianFrame& frame, size_t channel, size_t width, size_t height,
+                   uint8_t* to) {
+    const uint8_t* from = frame.first[channel];
+    for (size_t y = 0; y < height; ++y, from += frame.stride[channel], to += width) {
+      // Cells that follow take mostly the same frames' next samples, too far apart for the
+      // hardware to foresee.
+      hwy::Prefetch(from + kUnit);
+      copy_row(from, width, to);
+    }
+  }
+
+  const MedianBlock& block_;
+  bool shared_;
+  size_t begin_[kChannels + 1] = {};
+};
+
 }  // namespace
 
-void median_block(const uint8_t* const* rows, const size_t* strides, const float* inverse,
-                  size_t count, size_t width, size_t height, size_t stride,
+void median_block(const MedianBlock& block, const MedianFrame* frames, size_t count, size_t stride,
                   uint8_t* const* background, uint8_t* spread) {
-  alignas(64) uint8_t samples[kChannels][kMost][kRun], sorted[kMost][kRun], median[kChannels][kRun];
-  const size_t used = width * height, padded = (used + kUnit - 1) / kUnit * kUnit;
-  const auto scatter = [&](const uint8_t* from, uint8_t* to) {
-    for (size_t y = 0; y < height; ++y) copy_row(from + y * width, width, to + y * stride);
-  };
-  const Network& network = kNetworks[count];
-  for (size_t c = 0; c < kChannels; ++c) {
-    for (size_t i = 0; i < count; ++i) {
-      const uint8_t* from = rows[kChannels * i + c];
-      const size_t step = strides[kChannels * i + c];
-      uint8_t* to = samples[c][i];
-      for (size_t y = 0; y < height; ++y) {
-        // Cells that follow take mostly the same frames' next samples, too far apart for the
-        // hardware to foresee.
-        hwy::Prefetch(from + y * step + kUnit);
-        copy_row(from + y * step, width, to + y * width);
-      }
-      std::memset(to + used, 0, padded - used);
-      const float factor = inverse[kChannels * i + c];
-      if (factor != 1) HWY_DYNAMIC_DISPATCH(scale_row)(padded, factor, to);
-      for (size_t x = 0; x < padded; x += kUnit) std::memcpy(sorted[i] + x, to + x, kUnit);
-    }
-    HWY_DYNAMIC_DISPATCH(take_median)(network, padded, sorted, median[c]);
-    scatter(median[c], background[c]);
-  }
-  const uint8_t* const middle[3] = {median[0], median[1], median[2]};
+  alignas(64) uint8_t samples[kMost][kSamples], sorted[kMost][kSamples], median[kSamples] = {};
+  const BlockLayout layout(block, std::all_of(frames, frames + count, [](const MedianFrame& frame) {
+                             return frame.is_shared;
+                           }));
+  const size_t pixels = padded(block.width * block.height), all = padded(layout.all());
+  // Norms are of whole vectors, too.
+  const size_t read = std::max(all, layout.begin(kChannels - 1) + pixels);
   for (size_t i = 0; i < count; ++i) {
-    const uint8_t* const x[3] = {samples[0][i], samples[1][i], samples[2][i]};
-    residual_norm(x, middle, padded, sorted[i], 4);
+    for (size_t c = 0; c < kChannels; ++c) layout.take(frames[i], c, samples[i]);
+    std::memset(samples[i] + layout.all(), 0, read - layout.all());
+    for (size_t x = 0; x < all; x += kUnit) std::memcpy(sorted[i] + x, samples[i] + x, kUnit);
+  }
+  const Network& network = kNetworks[count];
+  HWY_DYNAMIC_DISPATCH(take_median)(network, all, sorted, median);
+
+  // Of pixels: where they share samples, made of these.
+  alignas(64) uint8_t room[2][kChannels][kRun + kUnit] = {};
+  const auto of_pixels = [&](const uint8_t* from, uint8_t(*made)[kRun + kUnit],
+                             const uint8_t** out) {
+    for (size_t c = 0; c < kChannels; ++c) {
+      out[c] = from + layout.begin(c);
+      if (!layout.is_shared(c)) continue;
+      spread_block(block, out[c], made[c]);
+      out[c] = made[c];
+    }
+  };
+  const auto scatter = [&](const uint8_t* from, uint8_t* to) {
+    for (size_t y = 0; y < block.height; ++y)
+      copy_row(from + y * block.width, block.width, to + y * stride);
+  };
+  const uint8_t *middle[kChannels], *x[kChannels];
+  of_pixels(median, room[0], middle);
+  for (size_t c = 0; c < kChannels; ++c) scatter(middle[c], background[c]);
+  for (size_t i = 0; i < count; ++i) {
+    of_pixels(samples[i], room[1], x);
+    residual_norm(x, middle, pixels, sorted[i], 4);
   }
   // One frame says nothing of a spread: its distance is 0.
-  HWY_DYNAMIC_DISPATCH(take_median)(network, padded, sorted, median[0]);
-  scatter(median[0], spread);
+  HWY_DYNAMIC_DISPATCH(take_median)(network, pixels, sorted, median);
+  scatter(median, spread);
 }
 
 }  // namespace qdmd

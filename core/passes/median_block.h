@@ -4,19 +4,38 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/channels.h"
+
 namespace qdmd {
 
 // Frames of a median, and pixels of a block, at most.
 constexpr int kMedianFrames = 15;
 constexpr int kMedianBlock = 128;
 
-// The block has `height` rows of `width` pixels. rows[3 i + c] is the first sample in frame i's
-// channel c, whose rows are strides[3 i + c] apart, inverse[3 i + c] what its samples are
-// multiplied by, of `count` frames. background[c]: the medians, the mean of the middle two, rounded
-// up, where count is even. spread: the median of the quaternion distances from them, in steps of
-// 1/4 level, up to 255; 0 for one frame. Rows of both are `stride` apart.
-void median_block(const uint8_t* const* rows, const size_t* strides, const float* inverse,
-                  size_t count, size_t width, size_t height, size_t stride,
+// A block of a picture, of `width` x `height` <= kMedianBlock pixels. In frames where pixels share
+// samples of channels 1 and 2, `columns` x `rows` do; the first of these samples has `left` columns
+// and `top` rows of pixels outside the block.
+struct MedianBlock {
+  size_t width, height;
+  size_t columns = 1, rows = 1, left = 0, top = 0;
+
+  size_t shared_width() const { return (left + width + columns - 1) / columns; }
+  size_t shared_height() const { return (top + height + rows - 1) / rows; }
+};
+
+// What a frame has at a block, in each channel: the first sample, how far its rows are apart, and
+// what the samples are multiplied by.
+struct MedianFrame {
+  const uint8_t* first[kChannels];
+  size_t stride[kChannels];
+  float inverse[kChannels];
+  bool is_shared = false;
+};
+
+// Of `count` <= kMedianFrames frames. background[c]: the medians, the mean of the middle two,
+// rounded up, where count is even. spread: the median of the quaternion distances from them, in
+// steps of 1/4 level, up to 255; 0 for one frame. Both are of pixels, rows of them `stride` apart.
+void median_block(const MedianBlock& block, const MedianFrame* frames, size_t count, size_t stride,
                   uint8_t* const* background, uint8_t* spread);
 
 }  // namespace qdmd

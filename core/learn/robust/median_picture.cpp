@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/passes/median_block.h"
-#include "core/passes/read_samples.h"
 
 namespace qdmd {
 
@@ -28,38 +27,44 @@ void median_picture(const Grid& grid, const Band& band, const StableFrames& stab
           stable.of_cell[part * static_cast<size_t>(grid.cols) + static_cast<size_t>(col)];
       const size_t known = shown.size(), count = std::min<size_t>(known, kMedianFrames);
       const LitPicture* pictures[kMedianFrames];
-      float inverse[kChannels * kMedianFrames];
+      MedianFrame at[kMedianFrames];
+      ChromaShape shape;
       for (size_t i = 0; i < count; ++i) {
         const LitPicture& frame =
             frames[static_cast<size_t>(shown[(2 * i + 1) * known / (2 * count)])];
         pictures[i] = &frame;
-        for (size_t c = 0; c < kChannels; ++c) inverse[kChannels * i + c] = 1 / frame.gain[c];
+        at[i].is_shared = frame.shape.is_shared();
+        if (at[i].is_shared) shape = frame.shape;
+        for (size_t c = 0; c < kChannels; ++c) {
+          at[i].stride[c] = static_cast<size_t>(
+              c > 0 && at[i].is_shared ? frame.shape.chroma_width() : grid.width);
+          at[i].inverse[c] = 1 / frame.gain[c];
+        }
       }
       const int left = grid.left(col), right = grid.left(col + 1);
       const int most = std::min(kMedianBlock, right - left), tall = kMedianBlock / most;
       const auto stride = static_cast<size_t>(grid.width);
       for (int y = top; y < bottom; y += tall)
         for (int x = left; x < right; x += most) {
-          const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
-          const auto width = static_cast<size_t>(std::min(most, right - x)),
-                     height = static_cast<size_t>(std::min(tall, bottom - y));
-          const uint8_t* rows[kChannels * kMedianFrames];
-          size_t strides[kChannels * kMedianFrames];
-          uint8_t room[kChannels * kMedianFrames][kMedianBlock];
+          const auto column = static_cast<size_t>(x), line = static_cast<size_t>(y);
+          const auto columns = static_cast<size_t>(shape.columns),
+                     rows = static_cast<size_t>(shape.rows);
+          const MedianBlock block = {static_cast<size_t>(std::min(most, right - x)),
+                                     static_cast<size_t>(std::min(tall, bottom - y)),
+                                     columns,
+                                     rows,
+                                     column % columns,
+                                     line % rows};
+          const size_t first = line * stride + column;
           for (size_t i = 0; i < count; ++i)
-            for (size_t c = 0; c < kChannels; ++c) {
-              const size_t k = kChannels * i + c;
-              const LitPicture& frame = *pictures[i];
-              const bool own = c == 0 || !frame.shape.is_shared();
-              rows[k] = own ? frame.plane[c] + first : room[k];
-              strides[k] = own ? stride : width;
-              for (size_t line = 0; !own && line < height; ++line)
-                read_samples(frame.shape, frame.plane[c], static_cast<int>(c),
-                             first + line * stride, width, room[k] + line * width);
-            }
+            for (size_t c = 0; c < kChannels; ++c)
+              at[i].first[c] =
+                  pictures[i]->plane[c] + (c > 0 && at[i].is_shared
+                                               ? line / rows * at[i].stride[c] + column / columns
+                                               : first);
           uint8_t* const out[3] = {background[0] + first, background[1] + first,
                                    background[2] + first};
-          median_block(rows, strides, inverse, count, width, height, stride, out, spread + first);
+          median_block(block, at, count, stride, out, spread + first);
         }
     }
   });

@@ -291,10 +291,9 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
 void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& frames,
                             const Gain& light, BackgroundModel* model) {
   const auto count = static_cast<size_t>(frames.size());
-  float inverse[kChannels * kMendingFrames];
-  const size_t strides[kChannels * kMendingFrames] = {};  // of blocks of one row
+  MedianFrame at[kMendingFrames] = {};  // of blocks of one row
   for (size_t i = 0; i < count; ++i)
-    for (size_t c = 0; c < kChannels; ++c) inverse[kChannels * i + c] = 1 / light[c];
+    for (size_t c = 0; c < kChannels; ++c) at[i].inverse[c] = 1 / light[c];
   const auto stride = static_cast<size_t>(grid_.width);
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;
@@ -304,17 +303,14 @@ void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& 
       for (int x = left; x < right; x += kMedianBlock) {
         const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
         const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
-        const uint8_t* rows[kChannels * kMendingFrames];
-        uint8_t room[kChannels * kMendingFrames][kMedianBlock];
+        uint8_t room[kMendingFrames][kChannels][kMedianBlock];
         for (size_t i = 0; i < count; ++i)
-          for (size_t c = 0; c < kChannels; ++c) {
-            const size_t k = kChannels * i + c;
-            rows[k] = read_samples(frames, static_cast<int>(i), static_cast<int>(c), first, width,
-                                   room[k]);
-          }
+          for (size_t c = 0; c < kChannels; ++c)
+            at[i].first[c] = read_samples(frames, static_cast<int>(i), static_cast<int>(c), first,
+                                          width, room[i][c]);
         uint8_t level[kChannels][kMedianBlock], spread[kMedianBlock];
         uint8_t* const out[3] = {level[0], level[1], level[2]};
-        median_block(rows, strides, inverse, count, width, 1, stride, out, spread);
+        median_block({width, 1}, at, count, stride, out, spread);
         model->replace(first, width, out);
       }
     for (int c = 0; c < kChannels; ++c)
