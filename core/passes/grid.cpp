@@ -103,31 +103,32 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& 
                    float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
   alignas(64) uint32_t sums[kColumns];
-  // Of pixels left of a cell's left edge; and the cells' widths.
+  // Of the samples before each; and of pixels left of a cell's left edge.
+  uint64_t running[kColumns + 1];
+  running[0] = 0;
   std::array<double, 2 * kMostCellsAlong + 1> before, across;
+  std::array<int, 2 * kMostCellsAlong + 1> edge;
   const auto cols = static_cast<size_t>(grid.cols);
-  for (size_t col = 0; col < cols; ++col)
-    across[col] = grid.left(static_cast<int>(col) + 1) - grid.left(static_cast<int>(col));
+  for (size_t col = 0; col <= cols; ++col) edge[col] = grid.left(static_cast<int>(col));
+  for (size_t col = 0; col < cols; ++col) across[col] = edge[col + 1] - edge[col];
   const int shared = samples.columns, all = (grid.width + shared - 1) / shared;
   before[0] = 0;
   for (int row = first_row; row < end_row; ++row, means += cols) {
     const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
     uint64_t sum = 0;  // of the samples so far
-    int next = 1;
+    size_t next = 1;
     for (int first = 0; first < all; first += kColumns) {
       const int count = std::min(kColumns, all - first);
       sum_rows(grid, samples, top, bottom, first, count, sums);
-      int s = 0;
-      for (; next <= grid.cols; ++next) {
-        // The edge may part the pixels of a sample.
-        const int edge = grid.left(next), end = edge / shared - first, part = edge % shared;
-        if (end + (part > 0) > count) break;
-        for (; s < end; ++s) sum += sums[s];
-        before[static_cast<size_t>(next)] =
-            static_cast<double>(static_cast<uint64_t>(shared) * sum +
-                                (part > 0 ? static_cast<uint64_t>(part) * sums[end] : 0));
+      for (int s = 0; s < count; ++s) running[s + 1] = running[s] + sums[s];
+      // An edge may part the pixels of a sample.
+      for (; next <= cols && edge[next] <= shared * (first + count); ++next) {
+        const int end = edge[next] / shared, part = edge[next] - end * shared;
+        uint64_t pixels = static_cast<uint64_t>(shared) * (sum + running[end - first]);
+        if (part > 0) pixels += static_cast<uint64_t>(part) * sums[end - first];
+        before[next] = static_cast<double>(pixels);
       }
-      for (; s < count; ++s) sum += sums[s];
+      sum += running[count];
     }
     HWY_DYNAMIC_DISPATCH(divide_differences)
     (before.data(), across.data(), bottom - top, cols, means);
