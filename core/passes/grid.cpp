@@ -107,11 +107,19 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& 
   uint64_t running[kColumns + 1];
   running[0] = 0;
   std::array<double, 2 * kMostCellsAlong + 1> before, across;
-  std::array<int, 2 * kMostCellsAlong + 1> edge;
+  // Samples left of a cell's edge, which may part the pixels of the next one.
+  struct Edge {
+    int samples, pixels;
+  };
+  std::array<Edge, 2 * kMostCellsAlong + 1> edges;
   const auto cols = static_cast<size_t>(grid.cols);
-  for (size_t col = 0; col <= cols; ++col) edge[col] = grid.left(static_cast<int>(col));
-  for (size_t col = 0; col < cols; ++col) across[col] = edge[col + 1] - edge[col];
-  const int shared = samples.columns, all = (grid.width + shared - 1) / shared;
+  const int shared = samples.columns;
+  for (size_t col = 0; col <= cols; ++col) {
+    const int x = grid.left(static_cast<int>(col));
+    edges[col] = {x / shared, x % shared};
+    if (col > 0) across[col - 1] = x - grid.left(static_cast<int>(col) - 1);
+  }
+  const int all = (grid.width + shared - 1) / shared;
   before[0] = 0;
   for (int row = first_row; row < end_row; ++row, means += cols) {
     const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
@@ -121,9 +129,9 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& 
       const int count = std::min(kColumns, all - first);
       sum_rows(grid, samples, top, bottom, first, count, sums);
       for (int s = 0; s < count; ++s) running[s + 1] = running[s] + sums[s];
-      // An edge may part the pixels of a sample.
-      for (; next <= cols && edge[next] <= shared * (first + count); ++next) {
-        const int end = edge[next] / shared, part = edge[next] - end * shared;
+      for (; next <= cols; ++next) {
+        const auto [end, part] = edges[next];
+        if (end + (part > 0) > first + count) break;
         uint64_t pixels = static_cast<uint64_t>(shared) * (sum + running[end - first]);
         if (part > 0) pixels += static_cast<uint64_t>(part) * sums[end - first];
         before[next] = static_cast<double>(pixels);

@@ -70,13 +70,16 @@ void SceneWatch::find_edges(const float* const planes[3], std::vector<float>* ed
 SceneWatch::Look SceneWatch::look_of(const std::vector<float>& frame,
                                      const std::vector<float>& background) const {
   Products tiles[kTilesAlong * kTilesAlong];
+  // Where column `tile` of tiles begins.
+  const auto begin = [this](size_t tile) { return (tile * cols_ + kTilesAlong - 1) / kTilesAlong; };
   size_t i = 0;
   for (size_t c = 0; c < kChannels; ++c)
-    for (size_t row = 0; row < rows_; ++row)
-      for (size_t col = 0; col < cols_; ++col) {
-        Products& tile = tiles[row * kTilesAlong / rows_ * kTilesAlong + col * kTilesAlong / cols_];
-        for (const size_t end = i + 2; i < end; ++i) tile.add(frame[i], background[i]);
-      }
+    for (size_t row = 0; row < rows_; ++row) {
+      Products* tile = tiles + row * kTilesAlong / rows_ * kTilesAlong;
+      for (size_t at = 0; at < kTilesAlong; ++at, ++tile)
+        for (const size_t end = i + 2 * (begin(at + 1) - begin(at)); i < end; ++i)
+          tile->add(frame[i], background[i]);
+    }
   size_t edged = 0, of_background = 0, strange = 0;
   for (const Products& tile : tiles) {
     const bool frame_flat = tile.flat(tile.aa), background_flat = tile.flat(tile.bb);
