@@ -488,19 +488,27 @@ Median naive_median(const Stack& stack) {
   return out;
 }
 
-Median median_of(const Stack& stack, int threads) {
-  Median out;
-  for (auto& plane : out.plane) plane.assign(stack.window.pixels(), kUntouched);
-  out.spread.assign(stack.window.pixels(), kUntouched);
-  uint8_t* const planes[3] = {out.plane[0].data(), out.plane[1].data(), out.plane[2].data()};
-  Pool pool(threads);
+// What stable frames are.
+std::vector<LitPicture> pictures_of(const Stack& stack) {
   std::vector<LitPicture> frames;
   for (int t : stack.frame_of)
     frames.push_back(
         {{stack.window.plane(t, 0), stack.window.plane(t, 1), stack.window.plane(t, 2)},
          stack.gains[static_cast<size_t>(t)]});
+  return frames;
+}
+
+Median median_of(const Stack& stack, const std::vector<LitPicture>& frames, int threads) {
+  Median out;
+  for (auto& plane : out.plane) plane.assign(stack.window.pixels(), kUntouched);
+  out.spread.assign(stack.window.pixels(), kUntouched);
+  uint8_t* const planes[3] = {out.plane[0].data(), out.plane[1].data(), out.plane[2].data()};
+  Pool pool(threads);
   median_picture(stack.grid, stack.stable, frames, &pool, planes, out.spread.data());
   return out;
+}
+Median median_of(const Stack& stack, int threads) {
+  return median_of(stack, pictures_of(stack), threads);
 }
 
 TEST(MedianPicture, IsTheMiddleOfEveryNumberOfFrames) {
@@ -532,6 +540,51 @@ TEST(MedianPicture, IsTakenInUnitLight) {
       for (size_t c = 0; c < 3; ++c) ASSERT_NEAR(other.plane[c][p], near.plane[c][p], 1);
       ASSERT_NEAR(other.spread[p], near.spread[p], 4 * std::sqrt(3.0) * 2 + 1);
     }
+  });
+}
+
+// Chroma that pixels share, in planes of its own and spread over the stack's frames.
+std::vector<std::vector<uint8_t>> share_chroma(const ChromaShape& shape, std::mt19937& rng,
+                                               Stack* stack) {
+  std::vector<std::vector<uint8_t>> planes;
+  for (int t = 0; t < stack->window.size(); ++t)
+    for (int c = 1; c < kChannels; ++c) {
+      std::vector<uint8_t>& samples = planes.emplace_back(shape.samples());
+      for (uint8_t& sample : samples) sample = static_cast<uint8_t>(rng() % 256);
+      for (int y = 0; y < shape.height; ++y)
+        for (int x = 0; x < shape.width; ++x)
+          stack->window.plane(stack->window.slot(t), c)[y * shape.width + x] =
+              samples[static_cast<size_t>(y / shape.rows * shape.chroma_width() + x / 2)];
+    }
+  return planes;
+}
+
+// Cells of an odd width begin with the second pixel of a pair. What an earlier window found is a
+// frame whose pixels have their own samples.
+TEST(MedianPicture, OfSharedSamplesIsThatOfPixels) {
+  on_every_target([] {
+    std::mt19937 rng(44);
+    for (const auto& [width, height, count] :
+         {std::array{60, 50, 31}, {63, 49, 40}, {70, 60, 20}, {331, 3, 7}, {1300, 7, 5}, {1, 1, 1}})
+      for (int rows : {1, 2})
+        for (int own : {0, 2, 7}) {
+          SCOPED_TRACE(testing::Message() << width << " x " << height << ", " << count << ", "
+                                          << rows << " rows, own samples in " << own);
+          const ChromaShape shape = {width, height, 2, rows};
+          Stack stack(width, height, count, {1, 0.5f, 2, 0.25f}, rng);
+          const auto shared = share_chroma(shape, rng, &stack);
+          std::vector<LitPicture> frames = pictures_of(stack);
+          for (size_t i = 0; i < frames.size(); ++i) {
+            if (own > 0 && i % static_cast<size_t>(own) == 0) continue;
+            const auto t = static_cast<size_t>(stack.frame_of[i]);
+            for (size_t c = 1; c < kChannels; ++c)
+              frames[i].plane[c] = shared[(kChannels - 1) * t + c - 1].data();
+            frames[i].shape = shape;
+          }
+          const Median expected = naive_median(stack), found = median_of(stack, frames, 2);
+          for (size_t c = 0; c < 3; ++c) ASSERT_EQ(found.plane[c], expected.plane[c]);
+          ASSERT_EQ(found.spread, expected.spread);
+        }
   });
 }
 
