@@ -32,11 +32,11 @@ TESTS = {
     'quaternion': 'quaternion double_double factorization hessenberg pencil schur svd dmd',
     'gram': 'gram gram_slices kernel shared_chroma dmd',
     'dmd': 'dmd dmd_degenerate solver channel_dmd estimator error_bound modes leading_spectrum',
-    'passes': 'passes grid chroma combine majority mask_passes soft_mask resample robust_parts robust_fill picture '
+    'passes': 'passes grid chroma combine majority mask_passes soft_mask resample robust_parts robust_fill picture median_picture '
               'parts_memory',
     'frames': 'frame_store shared_store engine sample_step memory',
     'model': 'background learnt learnt_file engine_output live',
-    'learn': 'robust_parts robust_memory absorb another_scene robust robust_fill sample_step freeze '
+    'learn': 'robust_parts robust_memory absorb another_scene robust robust_fill median_picture sample_step freeze '
              'parts_memory memory',
     'foreground': 'decision ignored soft_mask mask_passes picture engine_output regions parts_memory band',
     'engine': 'engine engine_output pacing live_plan live live_schedule freeze time_budget learnt '

@@ -8,7 +8,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 tests/install-dependencies.sh build neon
 tests=("$@")
-[ "$#" -gt 0 ] || tests=(kernel gram passes chroma digits combine mask_passes soft_mask resample robust_fill pool golden)
+[ "$#" -gt 0 ] || tests=(kernel gram passes chroma digits combine mask_passes soft_mask resample robust_fill median_picture pool golden)
 build=$PWD/build-neon
 mkdir -p "$build/packages"
 

@@ -37,7 +37,8 @@ struct Solve {
   GridFrames cells;
   Pool pool{1};
   std::vector<Gain> gains;
-  std::vector<LitPicture> pictures;
+  std::vector<LitPicture> pictures, shared_pictures;
+  PlaneSlots shared;
   StableFrames stable;
   ReferencePicture reference;
   std::vector<uint8_t> spread, reach, scratch;
@@ -74,16 +75,34 @@ struct Solve {
     for (auto& level : reference.level) level.resize(size.pixels());
     reference.threshold.assign(size.pixels(), 12);
     find_median();
+    share_chroma();
     for (int t = 0; t < size.window; ++t) find_mask_of(t);
   }
 
   std::array<const uint8_t*, 3> x(int t) const {
     return {window.plane(t, 0), window.plane(t, 1), window.plane(t, 2)};
   }
-  void find_median() {
+  // Of frames in which 2 x 2 pixels share the samples of channels 1 and 2.
+  void share_chroma() {
+    const ChromaShape shape = {size.width, size.height, 2, 2};
+    shared = PlaneSlots(size.window, shape);
+    for (int t = 0; t < size.window; ++t) {
+      LitPicture& picture = shared_pictures.emplace_back(pictures[size_t(t)]);
+      for (int c = 1; c < kChannels; ++c) {
+        uint8_t* to = shared.plane(t, c);
+        for (int y = 0; y < shape.height; y += 2)
+          for (int x = 0; x < shape.width; x += 2)
+            *to++ = window.plane(t, c)[size_t(y) * size_t(shape.width) + size_t(x)];
+        picture.plane[c] = shared.plane(t, c);
+      }
+      picture.shape = shape;
+    }
+  }
+  void find_median() { find_median(pictures); }
+  void find_median(const std::vector<LitPicture>& of) {
     uint8_t* const background[3] = {reference.level[0].data(), reference.level[1].data(),
                                     reference.level[2].data()};
-    median_picture(grid, stable, pictures, &pool, background, spread.data());
+    median_picture(grid, stable, of, &pool, background, spread.data());
   }
   void find_mask_of(int t) {
     find_mask(reference, x(t).data(), kSameLight, mask.of(t), scratch.data());
@@ -155,6 +174,8 @@ void add_all(const Size& size) {
   });
   // Costs what the cells' frames are, up to kMedianFrames: a pixel of the picture.
   add("median_picture", size, "ns/pixel", pixels, [](Solve& solve) { solve.find_median(); });
+  add("median_picture_of_shared_chroma", size, "ns/pixel", pixels,
+      [](Solve& solve) { solve.find_median(solve.shared_pictures); });
   add("residual_norm", size, "ns/pixel", pixels, [](Solve& solve) {
     const uint8_t* const l[3] = {solve.reference.level[0].data(), solve.reference.level[1].data(),
                                  solve.reference.level[2].data()};

@@ -1,6 +1,7 @@
 // What the tests of robust Q-DMD share: windows of real size, coarse pictures, whole runs.
 #pragma once
 
+#include <cmath>
 #include <memory>
 
 #include "core/parallel/pool.h"
@@ -8,6 +9,17 @@
 #include "tests/core/engine_util.h"
 
 namespace qdmd::test {
+
+// A level as a sample: at most 255, rounded down.
+inline uint8_t byte_of(float level) {
+  return static_cast<uint8_t>(static_cast<int>(level < 255.0f ? level : 255.0f));
+}
+inline uint8_t scaled(uint8_t sample, float factor) {
+  return byte_of(static_cast<float>(sample) * factor + 0.5f);
+}
+inline float norm(const int (&d)[3]) {
+  return std::sqrt(static_cast<float>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+}
 
 inline Grid grid_of(int rows, int cols) {
   Grid grid;

@@ -7,7 +7,6 @@
 
 #include "core/dmd/qdmd.h"
 #include "core/learn/robust/median_picture.h"
-#include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
 namespace qdmd {
@@ -219,103 +218,6 @@ void RobustLearner::recall(const Learnt& learnt) {
 void RobustLearner::follow(const std::vector<uint8_t> level[kChannels]) {
   for (int c = 0; c < kChannels; ++c)
     cell_means(grid_, level[c].data(), background_cells_.plane(published_, c));
-}
-
-void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
-  // Somebody may want more of a frame than one picture.
-  if (frame.number <= compared_) return;
-  compared_ = frame.number;
-  const int slot = frame.around.slot(frame.at);
-  const GridFrames& cells = room_.frames->cells();
-  const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
-  const Gain light = model->light(frame.t);
-  looks_.follow(now, light, frame.number);
-  const float* const background[3] = {background_cells_.plane(published_, 0),
-                                      background_cells_.plane(published_, 1),
-                                      background_cells_.plane(published_, 2)};
-  // A window that is solved as a whole knows by itself what was uncovered, unless it was absorbed.
-  if (frame.live || absorbed_.any()) {
-    std::vector<int> uncovered = looks_.uncovered(background);
-    if (looks_.any_news()) calm_ = 0;
-    if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
-    mend(uncovered, frame, light, model);
-  }
-  if (absorb_frames_ == 0) return;
-  const std::vector<int>& stood = looks_.stood(background, absorb_frames_);
-  for (int cell : stood) absorbed_.add(cell, looks_.since(cell));
-  mend(stood, frame, light, model);
-}
-
-void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
-                         BackgroundModel* model) {
-  if (cells.empty()) return;
-  calm_ = 0;
-  model->freeze_but_for_light(frame.t);
-  replace(cells, frame.around.every(2), light, model);
-  if (options_.low_bits() > 0)
-    replace_deep(cells, room_.frames->whole(frame.around.every(2)), light, model);
-}
-
-// The same of whole samples.
-void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRange& frames,
-                                 const Gain& light, BackgroundModel* model) const {
-  const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
-  const double unit = 1.0 / (1 << frames.low_bits());
-  for (int cell : cells) {
-    const int row = cell / grid_.cols, col = cell % grid_.cols;
-    for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
-      for (int x = grid_.left(col); x < grid_.left(col + 1); ++x) {
-        const auto p =
-            static_cast<size_t>(y) * static_cast<size_t>(grid_.width) + static_cast<size_t>(x);
-        float level[kChannels];
-        for (int c = 0; c < kChannels; ++c) {
-          // In order: there are a few.
-          double samples[kMendingFrames];
-          for (int t = 0; t < frames.size(); ++t) {
-            const double sample = frames.sample(t, c, p);
-            int at = t;
-            for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
-            samples[at] = sample;
-          }
-          const double middle = (samples[(count - 1) / 2] + samples[half]) / 2;
-          const auto channel = static_cast<size_t>(c);
-          level[channel] = static_cast<float>(middle * unit / static_cast<double>(light[channel]));
-        }
-        const float* const out[3] = {&level[0], &level[1], &level[2]};
-        model->replace(p, 1, out);
-      }
-  }
-}
-
-// The median of the frames in place of the background of these cells.
-void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& frames,
-                            const Gain& light, BackgroundModel* model) {
-  const auto count = static_cast<size_t>(frames.size());
-  MedianFrame at[kMendingFrames] = {};  // of blocks of one row
-  for (size_t i = 0; i < count; ++i)
-    for (size_t c = 0; c < kChannels; ++c) at[i].inverse[c] = 1 / light[c];
-  const auto stride = static_cast<size_t>(grid_.width);
-  for (int cell : cells) {
-    const int row = cell / grid_.cols, col = cell % grid_.cols;
-    const int left = grid_.left(col), right = grid_.left(col + 1);
-    for (int y = std::max(grid_.top(row) - band_.first(), 0);
-         y < std::min(grid_.top(row + 1) - band_.first(), band_.rows()); ++y)
-      for (int x = left; x < right; x += kMedianBlock) {
-        const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
-        const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
-        uint8_t room[kMendingFrames][kChannels][kMedianBlock];
-        for (size_t i = 0; i < count; ++i)
-          for (size_t c = 0; c < kChannels; ++c)
-            at[i].first[c] = read_samples(frames, static_cast<int>(i), static_cast<int>(c), first,
-                                          width, room[i][c]);
-        uint8_t level[kChannels][kMedianBlock], spread[kMedianBlock];
-        uint8_t* const out[3] = {level[0], level[1], level[2]};
-        median_block({width, 1}, at, count, stride, out, spread);
-        model->replace(first, width, out);
-      }
-    for (int c = 0; c < kChannels; ++c)
-      background_cells_.plane(published_, c)[cell] = looks_.level(cell, c);
-  }
 }
 
 void RobustLearner::set_sample_step(int step) {
