@@ -103,18 +103,20 @@ uint64_t doubled(uint32_t bytes) {
 // The first byte in memory is the lowest.
 static_assert(std::endian::native == std::endian::little);
 
-// Samples that two pixels of a row share, for each pixel of the block. Reads up to four bytes
-// behind the samples and writes up to eight behind the pixels.
-void spread_block(const MedianBlock& block, const uint8_t* samples, uint8_t* to) {
+// Samples that two pixels of a row share, `across` in a row, for each pixel of the block. Reads up
+// to four bytes behind the samples and writes up to eight behind the pixels.
+void spread_block(const MedianBlock& block, size_t across, const uint8_t* samples, uint8_t* to) {
   const size_t skipped = 8 * block.left, step = 8 - 2 * block.left;
+  size_t row = block.top;  // of the pixels that share these samples
   for (size_t y = 0; y < block.height; ++y, to += block.width) {
-    const uint8_t* from = samples + (block.top + y) / block.rows * block.shared_width();
+    const uint8_t* from = samples;
     for (size_t x = 0; x < block.width; x += step, from += step / 2) {
       uint32_t few;
       std::memcpy(&few, from, sizeof(few));
       const uint64_t pixels = doubled(few) >> skipped;
       std::memcpy(to + x, &pixels, sizeof(pixels));
     }
+    if (++row == block.rows) row = 0, samples += across;
   }
 }
 
@@ -122,10 +124,13 @@ void spread_block(const MedianBlock& block, const uint8_t* samples, uint8_t* to)
 class BlockLayout {
  public:
   // shared: channels 1 and 2 have the samples that pixels share.
-  BlockLayout(const MedianBlock& block, bool shared) : block_(block), shared_(shared) {
+  BlockLayout(const MedianBlock& block, bool shared)
+      : block_(block),
+        shared_(shared),
+        across_(block.shared_width()),
+        down_(block.shared_height()) {
     for (size_t c = 0; c < kChannels; ++c)
-      begin_[c + 1] = begin_[c] + (is_shared(c) ? block.shared_width() * block.shared_height()
-                                                : block.width * block.height);
+      begin_[c + 1] = begin_[c] + (is_shared(c) ? across_ * down_ : block.width * block.height);
   }
   size_t begin(size_t channel) const { return begin_[channel]; }
   size_t end(size_t channel) const { return begin_[channel + 1]; }
@@ -138,14 +143,18 @@ class BlockLayout {
     if (channel == 0 || !frame.is_shared) {
       copy(frame, channel, block_.width, block_.height, to);
     } else if (shared_) {
-      copy(frame, channel, block_.shared_width(), block_.shared_height(), to);
+      copy(frame, channel, across_, down_, to);
     } else {
       uint8_t few[kRun + sizeof(uint32_t)];
-      copy(frame, channel, block_.shared_width(), block_.shared_height(), few);
-      spread_block(block_, few, to);
+      copy(frame, channel, across_, down_, few);
+      spread(few, to);
     }
     if (const float factor = frame.inverse[channel]; factor != 1)
       HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), factor, to);
+  }
+  // Of the samples that pixels share.
+  void spread(const uint8_t* samples, uint8_t* to) const {
+    spread_block(block_, across_, samples, to);
   }
 
  private:
@@ -162,6 +171,7 @@ class BlockLayout {
 
   const MedianBlock& block_;
   bool shared_;
+  size_t across_, down_;  // of the samples that pixels share
   size_t begin_[kChannels + 1] = {};
 };
 
@@ -191,7 +201,7 @@ void median_block(const MedianBlock& block, const MedianFrame* frames, size_t co
     for (size_t c = 0; c < kChannels; ++c) {
       out[c] = from + layout.begin(c);
       if (!layout.is_shared(c)) continue;
-      spread_block(block, out[c], made[c]);
+      layout.spread(out[c], made[c]);
       out[c] = made[c];
     }
   };
