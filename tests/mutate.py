@@ -42,7 +42,7 @@ TESTS = {
     'engine': 'engine engine_output pacing live_plan live live_schedule freeze time_budget learnt '
               'another_scene memory',
     'align': 'motion stabilize resample parts_memory',
-    'parallel': 'pool side_thread gram_slices',
+    'parallel': 'pool side_thread workers gram_slices',
     'base': 'clock engine',
     'library': 'engine',
     'scene': 'scene scene_description scene_streams scene_objects scene_foliage scene_trees scene_ground scene_light scene_camera',

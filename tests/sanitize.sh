@@ -43,8 +43,8 @@ long() {
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
-    thread) names=(pool side_thread band gram_slices live live_schedule absorb another_scene) ;;
-    *) names=(engine kernel passes grid chroma digits picture combine gram gram_slices robust_fill median_picture robust_parts pool side_thread resample) ;;
+    thread) names=(pool side_thread workers band gram_slices live live_schedule absorb another_scene) ;;
+    *) names=(engine kernel passes grid chroma digits picture combine gram gram_slices robust_fill median_picture robust_parts pool side_thread workers resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done
   for name in features live separate faults; do targets+=("tests/gst/element-$name-test"); done
@@ -110,7 +110,7 @@ fi
 # Half of the time, for no other kernel.
 slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
 flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
-short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread}_test.cpp
+short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread,workers}_test.cpp
 short address,undefined kernels core/gram/{tile_kernel,kernel,gram,window,block_sums,shared_chroma}.cpp \
   core/passes/{chroma,combine,digits,fill,median_rows,planes,read_samples,residual}.cpp core/parallel/pool.cpp \
   tests/core/{gram,kernel,passes,chroma,digits,combine,shared_chroma}_test.cpp

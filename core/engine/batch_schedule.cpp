@@ -170,7 +170,7 @@ void BatchSchedule::drain(Queue* queue) {
 
 void BatchSchedule::restart() {
   forget_camera();
-  side().abandon();
+  workers().abandon();
   frames().clear();
   waiting_.reset();
   collection_.reset();

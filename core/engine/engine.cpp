@@ -15,7 +15,7 @@ namespace qdmd {
 namespace {
 
 // Pixels whose share of a pass is worth waking a thread for.
-constexpr size_t kPixelsPerBand = 32768;
+constexpr size_t kPixelsPerBand = 16384;
 
 }  // namespace
 
@@ -228,9 +228,7 @@ void Engine::read_next(int slot, const uint8_t* planes[kChannels]) {
 
 // Once a frame.
 void Engine::decide_next(OutputTask* task) {
-  // While the side thread works, its work has the pool.
-  if (!decided_)
-    background_->decide(task->x, workers_->side().idle() ? &workers_->pool() : nullptr);
+  if (!decided_) background_->decide(task->x, workers_->idle_pool());
   decided_ = true;
   task->mask = background_->decision().mask();
   task->shaded = background_->decision().shaded();
@@ -241,8 +239,7 @@ void Engine::soften(const Levels& levels, OutputTask* task) {
   if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames_.width(), frames_.height());
   const SoftEdge edge = {options_.mask_softness, background_->report().foreground.threshold};
   if (!softened_)
-    soft_mask_->make(background_->decision(), task->x, edge, ignored_,
-                     workers_->side().idle() ? &workers_->pool() : nullptr);
+    soft_mask_->make(background_->decision(), task->x, edge, ignored_, workers_->idle_pool());
   softened_ = true;
   task->mask = soft_mask_->alpha();
   task->soft = true;
@@ -263,7 +260,7 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
     if (frames_.low_bits() > 0) task->low[c] = frames_.untouched_low(slot, c);
   }
   Resampler* const resampler = &stabilizer_->resampler();
-  Pool* const pool = workers_->side().idle() ? &workers_->pool() : nullptr;
+  Pool* const pool = workers_->idle_pool();
   if (level) {
     restorer_->write_canvas(*task->model, frames_.window().pixels());
     restorer_->restore_level(pose, task->x, resampler, pool);
@@ -312,7 +309,7 @@ bool Engine::write_background(const MutableImageView& out) {
 bool Engine::learnt(Learnt* learnt) {
   if (!configured() || !background_->known() || !band().is_whole()) return false;
   // What it threw, the next frame is told.
-  workers_->side().rest();
+  workers_->rest();
   schedule_->show_newest();
   Learnt all;
   all.width = frames_.width();
@@ -337,7 +334,7 @@ Status Engine::may_learn_from(const Learnt& learnt) const {
 
 Status Engine::learn_from(const Learnt& learnt) {
   if (Status status = may_learn_from(learnt); !status.ok()) return status;
-  workers_->side().rest();
+  workers_->rest();
   schedule_->learn_from(learnt, queue_);
   return {};
 }
@@ -361,11 +358,10 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
       const int row = first * together;
       write_picture(task, levels, out, top + row, std::min(count * together, height - row));
     };
-    // While the side thread works, its work has the pool.
-    if (workers_->side().idle()) {
+    if (Pool* const pool = workers_->idle_pool()) {
       const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
                                             static_cast<size_t>(steps));
-      for_bands(workers_->pool(), steps, static_cast<int>(bands), write);
+      for_bands(*pool, steps, static_cast<int>(bands), write);
     } else {
       write(0, steps, 0);
     }

@@ -70,15 +70,18 @@ void LiveSchedule::settle() {
     wait_for_share();
     return;
   }
-  piece_.reset();
   wait();
+  if (piece_) work_of_frame_ = workers().done() / piece_->size;
+  piece_.reset();
   publish();
 }
 
 void LiveSchedule::wait_for_share() {
   const Clock::Span span = waiting();
+  // No solve is exactly as much work as the one before: the frame that it is due with does not wait
+  // for what is more.
   const auto frames = plan_.frames() + 1 - piece_->from, all = piece_->due - piece_->from;
-  side().wait_until(piece_->begun + piece_->took_before * frames / all);
+  workers().help_until_done(work_of_frame_ * piece_->size * frames * 5 / (4 * all));
 }
 
 void LiveSchedule::publish() {
@@ -104,9 +107,7 @@ void LiveSchedule::begin_work() {
     if (!step.solve) return;
     background().begin(span);
     build_ = Build{1, 0, first_frame};
-    if (!at_once)
-      piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices,
-                     std::chrono::steady_clock::now(), piece_took_};
+    if (!at_once) piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices, size};
   } else if (step.group > 0) {
     group_ = GramGroup{span,       step.group,        step.gram_slices, 0,
                        step.solve, step.build_slices, first_frame};
@@ -117,11 +118,7 @@ void LiveSchedule::begin_work() {
 void LiveSchedule::run(bool at_once) {
   wishes_ = background().wishes();
   if (!at_once) {
-    start([this] {
-      const auto begun = std::chrono::steady_clock::now();
-      work();
-      piece_took_ = std::chrono::steady_clock::now() - begun;
-    });
+    start([this] { work(); });
     return;
   }
   while (group_ || build_) work();
@@ -155,7 +152,7 @@ void LiveSchedule::drain(Queue* queue) {
 }
 
 void LiveSchedule::stop() noexcept {
-  side().abandon();
+  workers().abandon();
   group_.reset();
   build_.reset();
   piece_.reset();

@@ -41,12 +41,11 @@ class LiveSchedule : public Schedule {
   };
 
   // A solve in one piece: it goes on beside the frames until frame `due`, before which it must end.
-  // If only that frame waited, it could wait long. So each frame waits for its share of the time
-  // that the last solve took.
+  // If only that frame waited, it could wait long. So each frame helps until its share of the work
+  // that the last solve was is done.
   struct Piece {
     int64_t from, due;
-    std::chrono::steady_clock::time_point begun;
-    std::chrono::steady_clock::duration took_before;
+    int size;  // of its window
   };
 
   // Of the newest frame.
@@ -73,8 +72,8 @@ class LiveSchedule : public Schedule {
   Moment published_;         // when the model in use was published
   int64_t model_start_ = 0;  // the frame at time 0 of the model in use, counted like first_frame
   std::optional<Piece> piece_;
+  std::chrono::nanoseconds work_of_frame_{};  // of the last piece, for each frame of its window
   // The side thread's while it works.
-  std::chrono::steady_clock::duration piece_took_{};  // the last one
   std::optional<GramGroup> group_;
   std::optional<Build> build_;
   std::optional<int64_t> finished_;  // first frame of a solve that waits to be published

@@ -87,23 +87,21 @@ class Schedule {
   }
   // Frames are compared with another background, from the next one on.
   void refer_anew() { referred_to_ = 0; }
-  // While the side thread works, its work has the pool.
-  Pool* idle_pool() const { return side().idle() ? &workers().pool() : nullptr; }
+  Pool* idle_pool() const { return workers().idle_pool(); }
 
   FrameStore& frames() const { return *stage_.frames; }
   Background& background() const { return *stage_.background; }
   Workers& workers() const { return *stage_.workers; }
-  SideThread& side() const { return stage_.workers->side(); }
   Pace& pace() const { return *stage_.pace; }
   // Runs `work` beside the caller, where there is a thread for it. wait() comes before the next.
   void start(std::function<void()> work) {
-    if (side().start(std::move(work))) hold_up();
+    if (workers().start(std::move(work))) hold_up();
   }
   // For the side thread's work, whose time it charges itself. Throws what that threw.
   void wait() {
     const Clock::Span span = waiting();
-    if (!side().idle()) hold_up();
-    side().finish();
+    if (!workers().idle()) hold_up();
+    workers().finish();
   }
   Clock::Span waiting() const { return Clock::Span(*stage_.clock, Clock::waiting); }
   // With the newest frame, which is taken in.

@@ -19,7 +19,7 @@ namespace qdmd {
 namespace {
 
 // Pixels whose share of a pass is worth waking a thread for.
-constexpr size_t kPixelsPerPart = 65536;
+constexpr size_t kPixelsPerPart = 16384;
 // Pixels at most so far from foreground may say nothing of noise.
 constexpr int kMostNear = 16;
 // Pixels that are looked at together, at most: whole blocks.

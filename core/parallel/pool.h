@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -14,8 +15,10 @@
 namespace qdmd {
 
 // Runs the parts of one piece of work on several threads, the caller's among them. The others are
-// started once and sleep between calls. Which thread does which part differs from call to call, so
-// parts must write to places of their own, or combine to the same result in any order.
+// started once. Between calls they look for work for some microseconds, and then sleep: the passes
+// of a frame follow each other so quickly that waking a thread would take longer than its parts.
+// Which thread does which part differs from call to call, so parts must write to places of their
+// own, or combine to the same result in any order.
 class Pool {
  public:
   // `threads` counts the caller of run(); fewer work where the system starts no more.
@@ -48,28 +51,52 @@ class Pool {
     run_job(parts, {call, std::addressof(task)});
   }
 
+  // The calling thread is going to give another one work to do that calls run(), and goes on
+  // beside it. Until open_place(), one thread fewer helps there, so that there are never more at
+  // work than cores; help() takes its place. Not while run() runs.
+  void keep_place();
+  // That work is over. From any thread, while no run() runs.
+  void open_place();
+  using Time = std::chrono::steady_clock::time_point;
+  // The calling thread has nothing else to do: it does its share of the work for which a place is
+  // kept, until open_place() or, about, the time `then`. Returns for how long there was something
+  // to do.
+  Time::duration help(Time then = Time::max()) noexcept;
+
  private:
   struct Job {
     void (*call)(const void* task, size_t part, size_t worker) noexcept = nullptr;
     const void* task = nullptr;
   };
+  // Where one thread sleeps. The last one is for help().
+  using Bed = std::condition_variable;
 
   void start(int threads);
   void stop();
   void run_job(size_t parts, Job job) noexcept;
   void work(size_t worker) noexcept;
-  void do_parts(const Job& job, size_t parts, size_t worker) noexcept;
+  void join(size_t worker, Time then, std::unique_lock<std::mutex>* lock) noexcept;
+  void do_parts(const Job& job, size_t parts, size_t worker, Time then) noexcept;
+  template <typename Ready>
+  void await(std::unique_lock<std::mutex>* lock, Bed* bed, Time then, const Ready& ready) noexcept;
+  void wake(size_t worker) { beds_[worker - 1].notify_one(); }
+  void change() { changes_.fetch_add(1, std::memory_order_release); }
 
   std::mutex mutex_;
-  std::condition_variable wake_, idle_;
+  Bed idle_, helper_;
+  std::unique_ptr<Bed[]> beds_;  // of the workers
   // What the mutex guards.
   Job job_;                  // open to workers where `call` is set
   size_t parts_ = 0;         // of job_
   uint64_t jobs_begun_ = 0;  // a worker joins each of them at most once
   size_t busy_ = 0;          // workers inside job_
   bool stopping_ = false;
+  bool kept_ = false;     // the last worker's place
+  bool helping_ = false;  // somebody waits in it
 
+  std::atomic<uint64_t> changes_{0};  // of the above: what those look at who do not sleep yet
   std::atomic<size_t> next_part_{0};
+  bool may_look_ = false;  // there is a core for each thread
   std::vector<std::thread> workers_;
 };
 

@@ -1,13 +1,17 @@
 // The threads of a separator.
 #pragma once
 
+#include <atomic>
+#include <functional>
+
 #include "core/parallel/pool.h"
 #include "core/parallel/side_thread.h"
 
 namespace qdmd {
 
 // A pool for passes over pixels and, unless there is to be one thread only, a thread for the work
-// that goes on beside the caller.
+// that goes on beside the caller. The work beside may use the pool; while it runs, nobody else
+// does, and the caller counts as one of the threads: where it waits, it helps.
 class Workers {
  public:
   static constexpr int kMost = 256;
@@ -21,7 +25,20 @@ class Workers {
   explicit Workers(int threads, bool beside = true);
 
   Pool& pool() { return pool_; }
-  SideThread& side() { return side_; }
+  // The pool, or null while the work beside has it.
+  Pool* idle_pool() { return idle() ? &pool_ : nullptr; }
+
+  // SideThread's, of the work beside.
+  bool start(std::function<void()> work);
+  void finish();
+  void abandon() noexcept;
+  void rest() noexcept;
+  bool idle() { return side_.idle(); }
+  // Threads' time that went into the work since start(): that of the thread beside, all of it, and
+  // of the caller where it helped.
+  Pool::Time::duration done() const;
+  // Helps until so much went into it, or it is over.
+  void help_until_done(Pool::Time::duration work);
 
   // Asks for another number of threads. It holds from the next follow() on that finds no work under
   // way.
@@ -35,6 +52,11 @@ class Workers {
   int threads_, asked_;
   bool beside_;
   Pool pool_;
+  std::function<void()> work_;
+  Pool::Time begun_{};
+  Pool::Time::duration helped_{};
+  // When the newest work was over; not yet: 0.
+  std::atomic<Pool::Time::rep> over_{0};
   // The last member: it ends before the pool, which it may use.
   SideThread side_;
 };

@@ -187,8 +187,8 @@ TEST(SideThread, IsOneOfItsOwnUnlessThereIsToBeOneThread) {
     Workers workers(threads);
     const auto expect_beside = [&](bool beside) {
       std::thread::id id;
-      workers.side().start([&id] { id = std::this_thread::get_id(); });
-      workers.side().finish();
+      workers.start([&id] { id = std::this_thread::get_id(); });
+      workers.finish();
       EXPECT_EQ(id != std::this_thread::get_id(), beside) << threads;
     };
     expect_beside(threads != 1);
