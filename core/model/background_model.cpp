@@ -233,13 +233,7 @@ void BackgroundModel::freeze_at(double t) {
     // The pictures make room for L(t), pixel by pixel.
     const size_t pictures = picture_count();
     samples_.resize(std::max<size_t>(pictures, 3) * pixels_);
-    for (size_t p = 0; p < pixels_; ++p) {
-      std::array<float, 3> level{};
-      for (size_t c = 0; c < 3; ++c)
-        for (size_t k = 0; k < pictures; ++k)
-          level[c] += weights_[c * pictures + k] * samples_[k * pixels_ + p];
-      for (size_t c = 0; c < 3; ++c) samples_[c * pixels_ + p] = level[c];
-    }
+    levels_in_place(weights_.data(), pictures, pixels_, samples_.data());
     make_pictures(3);
   }
   direct_ = false;

@@ -142,6 +142,26 @@ void combine_four_deep(const double* coefficients, const uint16_t* const* planes
   combine(coefficients, planes, plane_count, first, count, used, sums);
 }
 
+// Products and sums are rounded one by one, whatever the vectors can do.
+template <class D>
+size_t level_in_place(const float* weights, size_t picture_count, size_t stride, size_t p,
+                      size_t count, float* samples) {
+  const D d;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    auto r = hn::Zero(d), g = r, b = r;
+    for (size_t k = 0; k < picture_count; ++k) {
+      const auto level = hn::LoadU(d, samples + k * stride + p);
+      r = hn::Add(r, hn::Mul(hn::Set(d, weights[k]), level));
+      g = hn::Add(g, hn::Mul(hn::Set(d, weights[picture_count + k]), level));
+      b = hn::Add(b, hn::Mul(hn::Set(d, weights[2 * picture_count + k]), level));
+    }
+    hn::StoreU(r, d, samples + p);
+    hn::StoreU(g, d, samples + stride + p);
+    hn::StoreU(b, d, samples + 2 * stride + p);
+  }
+  return p;
+}
+
 // Pixels that fill no vector take the same steps one by one, so that a pixel's bits do not depend
 // on where a run begins.
 template <typename T>
@@ -151,6 +171,12 @@ HWY_INLINE void all_levels(const float* weights, const float* const* pictures, s
                                                          0, first, count, out);
   level_vectors<hn::CappedTag<float, 1>>(weights, pictures, picture_count, rounding, p, first,
                                          count, out);
+}
+
+void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples) {
+  const size_t p =
+      level_in_place<hn::ScalableTag<float>>(weights, picture_count, count, 0, count, samples);
+  level_in_place<hn::CappedTag<float, 1>>(weights, picture_count, count, p, count, samples);
 }
 
 void levels(const float* weights, const float* const* pictures, size_t picture_count, float bias,
@@ -175,6 +201,7 @@ HWY_EXPORT(combine_four);
 HWY_EXPORT(combine_four_deep);
 HWY_EXPORT(levels);
 HWY_EXPORT(deep_levels);
+HWY_EXPORT(levels_in_place);
 
 }  // namespace
 
@@ -206,6 +233,10 @@ void deep_levels_of(const float* weights, const float* const* pictures, size_t p
                     int low_bits, size_t first, size_t count, uint16_t* const out[3]) {
   HWY_DYNAMIC_DISPATCH(deep_levels)
   (weights, pictures, picture_count, low_bits, first, count, out);
+}
+
+void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples) {
+  HWY_DYNAMIC_DISPATCH(levels_in_place)(weights, picture_count, count, samples);
 }
 
 }  // namespace qdmd

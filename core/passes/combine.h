@@ -33,4 +33,9 @@ void high_digits_of(const float* weights, const float* const* pictures, size_t p
 void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
                     int low_bits, size_t first, size_t count, uint16_t* const out[3]);
 
+// Pictures of `count` samples, one after another, become the three that the 3 x picture_count
+// weights make of them, before rounding: these take the places of the first three, for which there
+// is room. The same bits on every instruction set.
+void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples);
+
 }  // namespace qdmd
