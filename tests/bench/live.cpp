@@ -23,7 +23,7 @@ using namespace qdmd::bench;
 struct Options {
   int width = 1920, height = 1080, rate = 25, window = 100, hop = 25, threads = 0;
   double seconds = 60;
-  std::string mode = "live", method = "robust", output = "mask", extra;
+  std::string mode = "live", method = "robust", output = "mask", extra, times;
   bool unpaced = false, brief = false;
 };
 
@@ -228,6 +228,10 @@ int run(const Options& options) {
   if (!options.unpaced)
     std::printf("waiting_before_element most %llu\n", (unsigned long long)most_waiting);
   if (options.mode == "live") frame_line("in_element", watch.in_element);
+  if (!options.times.empty()) {
+    std::ofstream file(options.times);
+    for (const double time : watch.in_element) file << time << '\n';
+  }
   // Capture to the screen's door. A screen that follows a source without latency would drop what is
   // above its processing-deadline and max-lateness.
   if (!watch.after_capture.empty() && options.mode == "live")
@@ -282,6 +286,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"robust", "qdmd", "dmd"}))
       ->capture_default_str();
   app.add_option("--properties", options.extra, "more properties, as in gst-launch-1.0");
+  app.add_option("--times", options.times, "a file for the milliseconds of each frame");
   app.add_flag("--unpaced", options.unpaced, "frames as fast as they are taken");
   app.add_flag("--short", options.brief, "3 seconds of 320x240");
   CLI11_PARSE(app, argc, argv);
