@@ -91,8 +91,8 @@ void Background::finish(const MaskWishes& wishes) {
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
   next_report_.foreground =
-      foreground_statistics(*snapshots_, models_[next()], wishes.threshold, wishes.ignored,
-                            room_.frames->width(), room_.frames->band());
+      foreground_statistics(*snapshots_, models_[next()], wishes.threshold, *room_.pool,
+                            wishes.ignored, room_.frames->width(), room_.frames->band());
   // Nobody decides before there is a first model.
   if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
     rehearse(wishes);

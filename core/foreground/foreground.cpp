@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <mutex>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -38,8 +39,9 @@ void touch(const uint8_t* mask, size_t count, uint8_t* out) {
 double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold, const IgnoredAreas& ignored,
-                                           int width, const Band& band) {
+                                           double fixed_threshold, Pool& pool,
+                                           const IgnoredAreas& ignored, int width,
+                                           const Band& band) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = 8;
@@ -50,7 +52,6 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   const std::span histogram = std::span(counts).first(kBins),
                   beyond_limits = std::span(counts).last(kBins);
   const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
-  BackgroundRun background;
   const int frames = std::min(kFrames, snapshots.size());
   // In pixels of the picture: all, those that the snapshots have from `kept` on, and the own ones.
   const auto row = static_cast<size_t>(width);
@@ -60,16 +61,20 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                own = whole ? 0 : row * static_cast<size_t>(band.own_first()),
                own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
   const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
-  const size_t step = (runs + kRunsPerFrame - 1) / kRunsPerFrame;
+  const size_t step = std::max<size_t>(1, (runs + kRunsPerFrame - 1) / kRunsPerFrame);
+  std::mutex mutex;  // of the counts
   for (int i = 0; i < frames; ++i) {
     const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
     model.set_time(t);
     // Other frames look at other runs.
-    for (size_t run = static_cast<size_t>(i) % std::max<size_t>(step, 1); run < runs; run += step) {
+    const size_t first_run = static_cast<size_t>(i) % step;
+    pool.run((runs - std::min(runs, first_run) + step - 1) / step, [&](size_t part) {
+      const size_t run = first_run + part * step;
       const size_t begin = std::max(run * kMaxRun, own),
                    end = std::min({(run + 1) * kMaxRun, pixels, own_end});
-      if (begin >= end) continue;
+      if (begin >= end) return;
       const size_t first = begin - kept, count = end - begin;
+      BackgroundRun background;
       model.evaluate(first, count, background.rows);
       uint8_t counted[kMaxRun];
       std::fill_n(counted, count, uint8_t{1});
@@ -78,6 +83,9 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       uint8_t room[kChannels][kMaxRun];
       for (int c = 0; c < kChannels; ++c)
         x[c] = read_samples(snapshots, t, c, first, count, room[c]);
+      // A run has fewer pixels than 16 bits can count.
+      std::array<uint16_t, kBins> all{}, beyond{};
+      size_t bins = 0;
       for (size_t p = 0; p < count; ++p) {
         if (!counted[p]) continue;
         int squared = 0;
@@ -87,10 +95,16 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
         }
         const double norm = std::sqrt(squared);
         const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
-        ++histogram[bin];
-        if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond_limits[bin];
+        bins = std::max(bins, bin + 1);
+        ++all[bin];
+        if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond[bin];
       }
-    }
+      const std::lock_guard lock(mutex);
+      for (size_t bin = 0; bin < bins; ++bin) {
+        histogram[bin] += all[bin];
+        beyond_limits[bin] += beyond[bin];
+      }
+    });
   }
 
   if (!whole) band.team()->sum(Talk::statistics, counts);

@@ -5,6 +5,7 @@
 #include "core/foreground/ignored.h"
 #include "core/model/background_model.h"
 #include "core/parallel/band.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
@@ -33,8 +34,9 @@ double automatic_threshold(double noise);
 // Leaves the model's time at the last sampled snapshot. Pixels of snapshots, `width` wide, that are
 // ignored say nothing. band: which rows of the pictures the snapshots have; by default all.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
-                                           double fixed_threshold, const IgnoredAreas& ignored = {},
-                                           int width = 1, const Band& band = {});
+                                           double fixed_threshold, Pool& pool,
+                                           const IgnoredAreas& ignored = {}, int width = 1,
+                                           const Band& band = {});
 
 // One frame of a window and what its pictures are made of.
 struct OutputTask {

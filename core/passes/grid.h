@@ -41,6 +41,9 @@ class GridFrames {
   uint64_t bytes() const { return levels_.capacity() * sizeof(float); }
 
   size_t cells() const { return cells_; }
+  int size() const {
+    return cells_ > 0 ? static_cast<int>(levels_.size() / (cells_ * kChannels)) : 0;
+  }
   float* plane(int frame, int channel) { return levels_.data() + offset(frame, channel); }
   const float* plane(int frame, int channel) const {
     return levels_.data() + offset(frame, channel);
@@ -52,6 +55,29 @@ class GridFrames {
   }
   size_t cells_ = 0;
   std::vector<float> levels_;
+};
+
+// Such pictures, wherever they lie: names their places.
+class GridPictures {
+ public:
+  explicit GridPictures(size_t cells) : cells_(cells) {}
+  // All of them.
+  GridPictures(const GridFrames& frames) : GridPictures(frames.cells()) {  // NOLINT
+    for (int frame = 0; frame < frames.size(); ++frame) add(frames.plane(frame, 0));
+  }
+
+  void reserve(int count) { of_.reserve(static_cast<size_t>(count)); }
+  // R, then G, then B of all cells.
+  void add(const float* levels) { of_.push_back(levels); }
+  int size() const { return static_cast<int>(of_.size()); }
+  size_t cells() const { return cells_; }
+  const float* plane(int frame, int channel) const {
+    return of_[static_cast<size_t>(frame)] + static_cast<size_t>(channel) * cells_;
+  }
+
+ private:
+  size_t cells_;
+  std::vector<const float*> of_;
 };
 
 // The mean of each cell of a plane of grid.width * grid.height samples.

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <utility>
 
+#include "core/passes/bands.h"
 #include "core/passes/residual.h"
 #include "core/passes/unit_light.h"
 
@@ -262,22 +264,49 @@ Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], c
   return refined;
 }
 
-void blur(const uint8_t* plane, int width, int height, uint8_t* out) {
-  const auto w = static_cast<size_t>(width);
-  std::vector<uint16_t> memory(w * SumRing::kRows), total(w);
-  std::vector<uint8_t> padded(w + 2 * kMeanReach);
-  SumRing ring(memory.data(), w);
-  int next = 0;
-  for (int row = 0; row < height; ++row) {
+namespace {
+
+// What blur() needs for rows of a width: sums, a padded row, and the total.
+size_t blur_scratch(size_t width) {
+  const size_t bytes = 2 * width * (SumRing::kRows + 1) + width + 2 * kMeanReach;
+  // The next thread's begins at an even address, too.
+  return bytes + bytes % 2;
+}
+
+// Rows first .. end - 1.
+void blur_rows(const uint8_t* plane, size_t width, int height, int first, int end, uint8_t* scratch,
+               uint8_t* out) {
+  auto* const sums = reinterpret_cast<uint16_t*>(scratch);
+  SumRing ring(sums, width);
+  uint16_t* const total = sums + width * SumRing::kRows;
+  auto* const padded = reinterpret_cast<uint8_t*>(total + width);
+  int next = std::max(0, first - kMeanReach);
+  for (int row = first; row < end; ++row) {
     for (; next < std::min(height, row + kMeanReach + 1); ++next) {
-      std::memcpy(padded.data() + kMeanReach, plane + static_cast<size_t>(next) * w, w);
-      pad_ends(w, kMeanReach, padded.data());
-      HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded.data(), w, ring.of(next));
+      std::memcpy(padded + kMeanReach, plane + static_cast<size_t>(next) * width, width);
+      pad_ends(width, kMeanReach, padded);
+      HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, ring.of(next));
     }
-    HWY_DYNAMIC_DISPATCH(sum_five_rows)(ring.around(row, height).data(), w, total.data());
-    for (size_t x = 0; x < w; ++x)
-      out[static_cast<size_t>(row) * w + x] = static_cast<uint8_t>((total[x] + 12) / 25);
+    HWY_DYNAMIC_DISPATCH(sum_five_rows)(ring.around(row, height).data(), width, total);
+    for (size_t x = 0; x < width; ++x)
+      out[static_cast<size_t>(row) * width + x] = static_cast<uint8_t>((total[x] + 12) / 25);
   }
+}
+
+}  // namespace
+
+uint64_t blur_bytes(int width, int threads) {
+  return blur_scratch(static_cast<size_t>(width)) * static_cast<uint64_t>(threads);
+}
+
+void blur(const uint8_t* plane, int width, int height, Pool* pool, uint8_t* out) {
+  constexpr int kRows = 32;  // of a part
+  const auto w = static_cast<size_t>(width);
+  const size_t size = blur_scratch(w);
+  const auto scratch = std::make_unique_for_overwrite<uint8_t[]>(size * pool->threads());
+  for_bands(*pool, height, (height + kRows - 1) / kRows, [&](int first, int rows, size_t worker) {
+    blur_rows(plane, w, height, first, first + rows, scratch.get() + worker * size, out);
+  });
 }
 
 }  // namespace qdmd

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/parallel/pool.h"
 #include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
 
@@ -57,6 +58,8 @@ GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, cons
 bool refine_gain(const GainSums& sums, Gain* gain);
 
 // out[p] = the mean of the 5 x 5 samples around p; the border's samples stand for those outside.
-void blur(const uint8_t* plane, int width, int height, uint8_t* out);
+void blur(const uint8_t* plane, int width, int height, Pool* pool, uint8_t* out);
+// The bytes that it takes.
+uint64_t blur_bytes(int width, int threads);
 
 }  // namespace qdmd

@@ -138,8 +138,10 @@ size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector
 
 }  // namespace
 
-PatchFrames::PatchFrames(const Grid& grid, const GridFrames& frames, int count, Pool* pool)
+PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool)
     : grid_(grid),
+      bands_(std::min(grid.rows, std::max((grid.rows + kBandRows - 1) / kBandRows,
+                                          static_cast<int>(pool->threads())))),
       steps_(static_cast<size_t>(count) * kChannels * grid.cells() + kVector),
       limit_(grid.cells() + kVector),
       sums_(sums_size() * pool->threads()) {
@@ -167,11 +169,9 @@ size_t PatchFrames::sums_size() const {
 
 void PatchFrames::density(int count, Pool* pool, float* density) {
   const size_t cells = grid_.cells(), cols = static_cast<size_t>(grid_.cols);
-  const int bands = std::min(grid_.rows, std::max((grid_.rows + kBandRows - 1) / kBandRows,
-                                                  static_cast<int>(pool->threads())));
   const auto of = [&](int t) { return density + static_cast<size_t>(t) * cells; };
   std::fill_n(density, cells * static_cast<size_t>(count), 0.0f);
-  for_bands(*pool, grid_.rows, bands, [&](int first_row, int row_count, size_t worker) {
+  for_bands(*pool, grid_.rows, bands_, [&](int first_row, int row_count, size_t worker) {
     const auto first = static_cast<size_t>(first_row), end = first + static_cast<size_t>(row_count);
     uint16_t* sums = sums_.data() + worker * sums_size();
     for (int block = 0; block < count; block += kBlock) {
@@ -187,21 +187,21 @@ void PatchFrames::density(int count, Pool* pool, float* density) {
   });
 }
 
-void PatchFrames::alike(int s, int t, float* alike) {
-  const auto rows = static_cast<size_t>(grid_.rows);
-  std::fill_n(alike, grid_.cells(), 0.0f);
-  for (size_t first = 0; first < rows; first += kBandRows) HWY_DYNAMIC_DISPATCH(add_pair)
-  (steps(s), steps(t), limit_.data(), rows, static_cast<size_t>(grid_.cols), first,
-   std::min(rows, first + kBandRows), sums_.data(), alike, nullptr);
-  for (size_t cell = 0; cell < grid_.cells(); ++cell)
-    alike[cell] /= static_cast<float>(limit_[cell]);
+void PatchFrames::alike(int s, int t, int part, size_t worker, float* alike) {
+  const size_t first = first_cell(part), end = first_cell(part + 1);
+  const auto cols = static_cast<size_t>(grid_.cols);
+  std::fill(alike + first, alike + end, 0.0f);
+  HWY_DYNAMIC_DISPATCH(add_pair)
+  (steps(s), steps(t), limit_.data(), static_cast<size_t>(grid_.rows), cols, first / cols,
+   end / cols, sums_.data() + worker * sums_size(), alike, nullptr);
+  for (size_t cell = first; cell < end; ++cell) alike[cell] /= static_cast<float>(limit_[cell]);
 }
 
 uint64_t patch_distance_bytes(const Grid& grid, uint64_t count) {
   return sizeof(uint16_t) * grid.cells() * (kChannels * round_up(count) + count);
 }
 
-void patch_distance(const Grid& grid, const GridFrames& frames, int count, const int* reference,
+void patch_distance(const Grid& grid, const GridPictures& frames, int count, const int* reference,
                     Pool* pool, uint16_t* distance) {
   const auto rows = static_cast<size_t>(grid.rows), cols = static_cast<size_t>(grid.cols);
   const int known = std::max(count, *std::max_element(reference, reference + grid.cells()) + 1);

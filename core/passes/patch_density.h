@@ -36,13 +36,20 @@ inline int patch_cells(const Grid& grid, int row, int col, int radius = kNearRad
 // max(0, 1 - d(s, t) / kSimilar).
 class PatchFrames {
  public:
-  PatchFrames(const Grid& grid, const GridFrames& frames, int count, Pool* pool);
+  PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
   static uint64_t bytes(const Grid& grid, uint64_t count);
 
   // density[t * cells + cell] = the sum over frames s < count of how alike s and t are.
   void density(int count, Pool* pool, float* density);
-  // alike[cell]: how alike s and t are.
-  void alike(int s, int t, float* alike);
+  // Parts of the grid, enough for all threads, and where they begin; part parts() begins at the
+  // end.
+  int parts() const { return bands_; }
+  size_t first_cell(int part) const {
+    return static_cast<size_t>(int64_t{part} * grid_.rows / bands_) *
+           static_cast<size_t>(grid_.cols);
+  }
+  // alike[cell]: how alike s and t are, at the cells of a part. Threads have numbers of their own.
+  void alike(int s, int t, int part, size_t worker, float* alike);
 
  private:
   const uint16_t* steps(int frame) const {
@@ -51,6 +58,7 @@ class PatchFrames {
   size_t sums_size() const;
 
   Grid grid_;
+  int bands_;
   // Readable up to whole vectors behind the last cell. limit_: of each cell, the patch's steps at
   // which nothing is alike.
   std::vector<uint16_t> steps_, limit_;
@@ -60,7 +68,7 @@ class PatchFrames {
 // distance[cell * count + t]: the steps that the patches around the cell in frame t and in frame
 // reference[cell] differ by, all channels together: d times kChannels * kStepsPerLevel *
 // patch_cells(), of patches of 3 x 3.
-void patch_distance(const Grid& grid, const GridFrames& frames, int count, const int* reference,
+void patch_distance(const Grid& grid, const GridPictures& frames, int count, const int* reference,
                     Pool* pool, uint16_t* distance);
 // The memory that it takes, with the result.
 uint64_t patch_distance_bytes(const Grid& grid, uint64_t count);

@@ -54,6 +54,7 @@ struct Scene {
   std::vector<double> coefficients;
   BackgroundModel model, clean;
   Decision decision;
+  Pool pool{1};
   int turn = 0;
 
   explicit Scene(const Size& size_)
@@ -347,7 +348,7 @@ void add_all(const Size& size) {
   add(
       "foreground_statistics", size, [](Scene&) { return Traffic(); },
       [](Scene& scene) {
-        benchmark::DoNotOptimize(foreground_statistics(scene.window, scene.model, 0));
+        benchmark::DoNotOptimize(foreground_statistics(scene.window, scene.model, 0, scene.pool));
       });
 }
 

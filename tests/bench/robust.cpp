@@ -155,8 +155,9 @@ void add_all(const Size& size) {
     for (int c = 0; c < kChannels; ++c)
       cell_means(solve.grid, solve.x(t)[size_t(c)], solve.cells.plane(t, c));
   });
-  add("light_of", size, "ns/cell", all_cells,
-      [](Solve& solve) { benchmark::DoNotOptimize(light_of(solve.cells, solve.size.window)); });
+  add("light_of", size, "ns/cell", all_cells, [](Solve& solve) {
+    benchmark::DoNotOptimize(light_of(solve.cells, solve.size.window, &solve.pool));
+  });
   add(
       "patch_density", size, "ns/pair",
       [](const Solve& solve) {

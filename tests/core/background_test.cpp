@@ -364,7 +364,8 @@ ForegroundStatistics statistics_of(double sigma, double foreground, double fixed
   first.a(0, 0) = 1;
   BackgroundModel model;
   model.build(window, model_of(first, 1.0, Quaterniond(1.0)));
-  return foreground_statistics(window, model, fixed_threshold);
+  Pool pool(1);
+  return foreground_statistics(window, model, fixed_threshold, pool);
 }
 
 TEST(ForegroundStatistics, FindsTheNoiseBehindAForeground) {

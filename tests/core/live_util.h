@@ -175,7 +175,8 @@ struct FreshModel {
     summary = decomposition.summary;
     model.begin(window, decomposition.background, live);
     model.build_slice(0, clip.pixels);
-    foreground = foreground_statistics(window, model, options.foreground_threshold);
+    Pool pool(1);
+    foreground = foreground_statistics(window, model, options.foreground_threshold, pool);
     expect_foreground_by_sorting(options.foreground_threshold);
   }
   FreshModel(const Clip& clip_, const EngineOptions& options) : FreshModel(clip_, clip_, options) {}

@@ -368,13 +368,14 @@ TEST(RefineGain, OneStepOfLightInOnePixelIsEnough) {
 // ---- Blur ----
 
 TEST(Blur, IsTheMeanOfFiveByFive) {
-  on_every_target([] {
+  Pool pool(3);
+  on_every_target([&] {
     std::mt19937 rng(39);
     for (int width : {1, 2, 3, 4, 5, 17, 64, 70})
-      for (int height : {1, 2, 3, 5, 9}) {
+      for (int height : {1, 2, 3, 5, 9, 65, 100}) {
         const auto plane = random_picture(static_cast<size_t>(width * height), rng);
         BeforeTheEdge<uint8_t> out(static_cast<size_t>(width * height));
-        blur(plane.data(), width, height, out.data());
+        blur(plane.data(), width, height, &pool, out.data());
         for (int y = 0; y < height; ++y)
           for (int x = 0; x < width; ++x) {
             int sum = 0;

@@ -23,9 +23,10 @@ struct Kept {
       std::fill_n(window.plane(0, c), 6, static_cast<uint8_t>(number % 200 + c));
       std::fill_n(cells.plane(0, c), 6, static_cast<float>(number));
     }
-    memory.keep(number, SnapshotRange(window), 0, cells, horizon);
+    memory.keep(number, SnapshotRange(window), 0, cells, horizon, &pool);
   }
 
+  Pool pool{2};
   Grid grid;
   FrameMemory memory;
   Window window;

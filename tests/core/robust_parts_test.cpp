@@ -102,7 +102,8 @@ TEST(Patches, DensityIsThatOfTheDoubleLoop) {
         // Two frames by themselves.
         std::vector<float> alike(grid.cells());
         PatchFrames patches(grid, frames, count, &pool);
-        patches.alike(0, count - 1, alike.data());
+        for (int part = 0; part < patches.parts(); ++part)
+          patches.alike(0, count - 1, part, 0, alike.data());
         for (int y = 0; y < rows; ++y)
           for (int x = 0; x < cols; ++x) {
             const PatchSum patch(grid, frames, 0, count - 1, y, x);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/passes/bands.h"
 #include "core/passes/read_samples.h"
 
 namespace qdmd {
@@ -60,19 +61,24 @@ int FrameMemory::older_than(int64_t number) const {
 }
 
 void FrameMemory::keep(int64_t number, const SnapshotRange& snapshots, int index,
-                       const GridFrames& cells, int64_t horizon) {
+                       const GridFrames& cells, int64_t horizon, Pool* pool) {
   if (capacity_ == 0) return;
   while (!kept_.empty() && kept_.front().number < number - horizon) kept_.erase(kept_.begin());
   if (size() == capacity_)
     kept_.erase(kept_.begin() + static_cast<ptrdiff_t>(least_missed(number)));
   if (planes_.shape().is_shared() && !snapshots.shape().is_shared()) unshare();
   const int free = free_slot();
-  for (int c = 0; c < kChannels; ++c) {
+  constexpr size_t kParts = 4;  // of a plane
+  pool->run(kChannels * kParts, [&](size_t part) {
+    const int c = static_cast<int>(part / kParts);
+    const Slice slice = {static_cast<int>(part % kParts), kParts};
     const size_t samples =
         c > 0 && planes_.shape().is_shared() ? planes_.shape().samples() : snapshots.pixels();
-    std::copy_n(snapshots.plane(index, c), samples, planes_.plane(free, c));
-    std::copy_n(cells.plane(snapshots.slot(index), c), cells.cells(), cells_.plane(free, c));
-  }
+    const size_t first = slice.first(samples, 1), size = slice.size(samples, 1);
+    std::copy_n(snapshots.plane(index, c) + first, size, planes_.plane(free, c) + first);
+    if (slice.index == 0)
+      std::copy_n(cells.plane(snapshots.slot(index), c), cells.cells(), cells_.plane(free, c));
+  });
   kept_.push_back({number, free});
 }
 

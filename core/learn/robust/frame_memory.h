@@ -40,7 +40,7 @@ class FrameMemory {
   // with its cells. Frames older than `horizon` frames are forgotten. If its pixels share no
   // samples any more, those of all frames get their own: throws std::bad_alloc.
   void keep(int64_t number, const SnapshotRange& snapshots, int index, const GridFrames& cells,
-            int64_t horizon);
+            int64_t horizon, Pool* pool);
 
  private:
   struct Kept {

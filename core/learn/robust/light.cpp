@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "core/passes/median_rows.h"
 
@@ -82,17 +84,22 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   return gain;
 }
 
-Gain gain_over(const GridFrames& frames, int t, const GridFrames& references, int reference,
+// The planes of one picture of cells.
+struct CellPlanes {
+  const float* of[kChannels];
+
+  template <typename Pictures>
+  CellPlanes(const Pictures& frames, int frame)
+      : of{frames.plane(frame, 0), frames.plane(frame, 1), frames.plane(frame, 2)} {}
+};
+
+Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
                LightScratch* scratch) {
-  const float* const frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-  const float* const background[3] = {references.plane(reference, 0),
-                                      references.plane(reference, 1),
-                                      references.plane(reference, 2)};
-  const float before = agreement(frame, background, frames.cells(), kSameLight);
+  const float before = agreement(frame.of, background.of, cells, kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
-  const Gain gain = shared_gain(frame, background, frames.cells(), scratch);
-  const float after = agreement(frame, background, frames.cells(), gain);
+  const Gain gain = shared_gain(frame.of, background.of, cells, scratch);
+  const float after = agreement(frame.of, background.of, cells, gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
 
@@ -109,25 +116,10 @@ Gain without_noise(const Gain& gain) {
 
 }  // namespace
 
-GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains) {
-  const int used = std::min(count, kMedianRows);
-  GridFrames result(frames.cells(), 1);
-  for (int c = 0; c < kChannels; ++c) {
-    const float* planes[kMedianRows];
-    float divisors[kMedianRows];
-    for (int i = 0; i < used; ++i) {
-      const int t = static_cast<int>(int64_t{i} * count / used);
-      planes[i] = frames.plane(t, c);
-      divisors[i] = gains[static_cast<size_t>(t)][static_cast<size_t>(c)];
-    }
-    median_rows(planes, divisors, static_cast<size_t>(used), frames.cells(), result.plane(0, c));
-  }
-  return result;
-}
-
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch) {
-  return without_noise(gain_over(frames, frame, background, reference, scratch));
+  return without_noise(
+      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
 }
 
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
@@ -137,14 +129,10 @@ Gain light_between(const GridFrames& frames, int frame, const GridFrames& backgr
     for (size_t c = 0; c < kChannels; ++c) middle[c] = std::sqrt(before[c] * after[c]);
     return middle;
   }
-  const float* const of_frame[3] = {frames.plane(frame, 0), frames.plane(frame, 1),
-                                    frames.plane(frame, 2)};
-  const float* const of_reference[3] = {background.plane(reference, 0),
-                                        background.plane(reference, 1),
-                                        background.plane(reference, 2)};
+  const CellPlanes of_frame(frames, frame), of_reference(background, reference);
   const size_t cells = frames.cells();
-  return agreement(of_frame, of_reference, cells, before) >=
-                 agreement(of_frame, of_reference, cells, after)
+  return agreement(of_frame.of, of_reference.of, cells, before) >=
+                 agreement(of_frame.of, of_reference.of, cells, after)
              ? before
              : after;
 }
@@ -153,83 +141,139 @@ namespace {
 
 bool changes(const Gain& gain) { return std::abs(std::log(brightness(gain))) > kStill; }
 
-// The mean over frames 0 .. count - 1 of the share of cells that agree with `reference`.
-float mean_agreement(const GridFrames& frames, int count, const std::vector<Gain>& gains,
-                     const GridFrames& reference) {
-  const float* const of_reference[3] = {reference.plane(0, 0), reference.plane(0, 1),
-                                        reference.plane(0, 2)};
-  float sum = 0;
-  for (int t = 0; t < count; ++t) {
-    const float* const of_frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-    sum += agreement(of_frame, of_reference, frames.cells(), gains[static_cast<size_t>(t)]);
+// Frames 0 .. count - 1 of some pictures, compared by the threads of a pool.
+class FramesOfLight {
+ public:
+  FramesOfLight(const GridPictures& frames, int count, Pool* pool)
+      : frames_(frames), count_(static_cast<size_t>(count)), pool_(pool), median_(cells(), 1) {
+    for (size_t i = 0; i < (pool ? pool->threads() : 1); ++i) scratch_.emplace_back(cells());
   }
-  return sum / static_cast<float>(count);
-}
 
-// The gain of each frame over their common background, once `gains` are about right: where that
-// makes fewer of its cells agree, its gain stays.
-void sharpen(const GridFrames& frames, int count, LightScratch* scratch, std::vector<Gain>* gains) {
-  const GridFrames reference = median_frame(frames, count, *gains);
-  const float* const of_reference[3] = {reference.plane(0, 0), reference.plane(0, 1),
-                                        reference.plane(0, 2)};
-  for (int t = 0; t < count; ++t) {
-    const float* const of_frame[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-    Gain& gain = (*gains)[static_cast<size_t>(t)];
-    const Gain sharper = shared_gain(of_frame, of_reference, frames.cells(), scratch);
-    if (agreement(of_frame, of_reference, frames.cells(), sharper) >
-        agreement(of_frame, of_reference, frames.cells(), gain))
-      gain = sharper;
+  // Of each frame by itself, over the median of all.
+  std::vector<Gain> over_median() {
+    std::vector<Gain> gains(count_, kSameLight);
+    // The second reference is sharper where light changed.
+    for (int round = 0; round < 2; ++round) {
+      const CellPlanes reference(median(gains), 0);
+      for_each(count_, [&](size_t t, size_t worker) {
+        gains[t] = gain_over(planes(t), reference, cells(), &scratch_[worker]);
+      });
+      if (std::none_of(gains.begin(), gains.end(), is_lit)) break;
+    }
+    return gains;
   }
-}
 
-// What changes from each frame to the next, added up: most of a picture is the same in both, people
-// included, even where no two frames far apart share much of the background.
-std::vector<Gain> followed_light(const GridFrames& frames, int count, LightScratch* scratch) {
-  std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
-  for (int t = 1; t < count; ++t) {
-    const float* const now[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-    const float* const before[3] = {frames.plane(t - 1, 0), frames.plane(t - 1, 1),
-                                    frames.plane(t - 1, 2)};
-    const Gain step = shared_gain(now, before, frames.cells(), scratch);
-    for (size_t c = 0; c < kChannels; ++c)
-      gains[static_cast<size_t>(t)][c] =
-          std::max(kLeastGain, gains[static_cast<size_t>(t) - 1][c] * step[c]);
+  // What changes from each frame to the next, added up: most of a picture is the same in both,
+  // people included, even where no two frames far apart share much of the background.
+  std::vector<Gain> followed() {
+    std::vector<Gain> steps(count_, kSameLight);
+    for_each(count_ - 1, [&](size_t t, size_t worker) {
+      steps[t + 1] = shared_gain(planes(t + 1).of, planes(t).of, cells(), &scratch_[worker]);
+    });
+    std::vector<Gain> gains(count_, kSameLight);
+    for (size_t t = 1; t < count_; ++t)
+      for (size_t c = 0; c < kChannels; ++c)
+        gains[t][c] = std::max(kLeastGain, gains[t - 1][c] * steps[t][c]);
+    return gains;
   }
-  return gains;
-}
 
-// Of each frame by itself, over the median of all.
-std::vector<Gain> light_over_median(const GridFrames& frames, int count, LightScratch* scratch) {
-  std::vector<Gain> gains(static_cast<size_t>(count), kSameLight);
-  // The second reference is sharper where light changed.
-  for (int round = 0; round < 2; ++round) {
-    const GridFrames reference = median_frame(frames, count, gains);
-    for (int t = 0; t < count; ++t)
-      gains[static_cast<size_t>(t)] = gain_over(frames, t, reference, 0, scratch);
-    if (std::none_of(gains.begin(), gains.end(), is_lit)) break;
+  // The gain of each frame over their common background, once `gains` are about right: where that
+  // makes fewer of its cells agree, its gain stays.
+  void sharpen(std::vector<Gain>* gains) {
+    const CellPlanes reference(median(*gains), 0);
+    for_each(count_, [&](size_t t, size_t worker) {
+      Gain& gain = (*gains)[t];
+      const Gain sharper = shared_gain(planes(t).of, reference.of, cells(), &scratch_[worker]);
+      if (agreement(planes(t).of, reference.of, cells(), sharper) >
+          agreement(planes(t).of, reference.of, cells(), gain))
+        gain = sharper;
+    });
   }
-  return gains;
-}
+
+  // The mean over the frames of the share of cells that agree with their median.
+  float mean_agreement(const std::vector<Gain>& gains) {
+    const CellPlanes reference(median(gains), 0);
+    std::vector<float> agree(count_);
+    for_each(count_, [&](size_t t, size_t) {
+      agree[t] = agreement(planes(t).of, reference.of, cells(), gains[t]);
+    });
+    return std::accumulate(agree.begin(), agree.end(), 0.0f) / static_cast<float>(count_);
+  }
+
+  // Each cell's median over the frames (kMedianRows of them at most) in unit light.
+  const GridFrames& median(const std::vector<Gain>& gains) {
+    if (median_gains_ == gains) return median_;
+    const size_t used = std::min<size_t>(count_, kMedianRows);
+    constexpr size_t kTogether = 512;
+    const size_t parts = (cells() + kTogether - 1) / kTogether;
+    for_each(kChannels * parts, [&](size_t part, size_t) {
+      const size_t c = part / parts, first = part % parts * kTogether;
+      const float* rows[kMedianRows];
+      float divisors[kMedianRows];
+      for (size_t i = 0; i < used; ++i) {
+        const size_t t = i * count_ / used;
+        rows[i] = planes(t).of[c] + first;
+        divisors[i] = gains[t][c];
+      }
+      median_rows(rows, divisors, used, std::min(kTogether, cells() - first),
+                  median_.plane(0, static_cast<int>(c)) + first);
+    });
+    median_gains_ = gains;
+    return median_;
+  }
+  GridFrames take_median(const std::vector<Gain>& gains) {
+    median(gains);
+    return std::move(median_);
+  }
+
+ private:
+  size_t cells() const { return frames_.cells(); }
+  CellPlanes planes(size_t t) const { return {frames_, static_cast<int>(t)}; }
+  template <typename Work>
+  void for_each(size_t count, const Work& work) {
+    if (pool_) {
+      pool_->run(count, work);
+    } else {
+      for (size_t i = 0; i < count; ++i) work(i, size_t{0});
+    }
+  }
+
+  const GridPictures& frames_;
+  size_t count_;
+  Pool* pool_;
+  std::vector<LightScratch> scratch_;  // of the threads
+  GridFrames median_;
+  std::vector<Gain> median_gains_;  // with which it was made
+};
 
 }  // namespace
 
-std::vector<Gain> light_of(const GridFrames& frames, int count) {
-  if (count < 2) return std::vector<Gain>(static_cast<size_t>(count), kSameLight);
-  LightScratch scratch(frames.cells());
-  std::vector<Gain> gains = light_over_median(frames, count, &scratch);
-  const float agree = mean_agreement(frames, count, gains, median_frame(frames, count, gains));
+std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool, GridFrames* median) {
+  FramesOfLight all(frames, count, pool);
+  if (count < 2) {
+    std::vector<Gain> same(static_cast<size_t>(count), kSameLight);
+    if (median) *median = all.take_median(same);
+    return same;
+  }
+  std::vector<Gain> gains = all.over_median();
+  const float agree = all.mean_agreement(gains);
   // Where nearly all agrees, nothing is left to be followed.
   if (agree < kAllAgree) {
-    std::vector<Gain> followed = followed_light(frames, count, &scratch);
+    std::vector<Gain> followed = all.followed();
     if (std::any_of(followed.begin(), followed.end(), changes)) {
-      sharpen(frames, count, &scratch, &followed);
-      const float better =
-          mean_agreement(frames, count, followed, median_frame(frames, count, followed));
+      all.sharpen(&followed);
+      const float better = all.mean_agreement(followed);
       if (better > std::max(kLeastFollowed, agree + kFollowed)) gains = std::move(followed);
     }
   }
   if (std::any_of(gains.begin(), gains.end(), is_lit)) settle_light(&gains);
+  if (median) *median = all.take_median(gains);
   return gains;
+}
+
+uint64_t light_of_bytes(const Grid& grid, int threads) {
+  return GridFrames::bytes(grid, 1) +
+         static_cast<uint64_t>(threads) * LightScratch::bytes(grid.cells());
 }
 
 void settle_light(std::vector<Gain>* gains) {

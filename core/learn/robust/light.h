@@ -5,17 +5,20 @@
 #include <utility>
 #include <vector>
 
+#include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
 
 // The gains of frames 0 .. count - 1 over their common background: 1 where a change of light does
 // not explain what the frame and the background differ in, so that what moves counts as no light.
-// Small changes around the light of most frames are left out: they are noise.
-std::vector<Gain> light_of(const GridFrames& frames, int count);
-
-// Each cell's median over frames 0 .. count - 1 (64 of them at most) in unit light, as frame 0.
-GridFrames median_frame(const GridFrames& frames, int count, const std::vector<Gain>& gains);
+// Small changes around the light of most frames are left out: they are noise. median: becomes each
+// cell's median over the frames (64 of them at most) in unit light, as frame 0; or null. pool: null
+// for one thread.
+std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool = nullptr,
+                           GridFrames* median = nullptr);
+// The bytes that it takes.
+uint64_t light_of_bytes(const Grid& grid, int threads);
 
 // Memory for comparing two pictures of so many cells, which can serve many calls.
 class LightScratch {

@@ -1,7 +1,9 @@
 #include "core/learn/robust/robust_learner.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <utility>
 
@@ -112,9 +114,10 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
        pixels());
   // One after another: what a start compares, with densities and then a spread; masks; the
   // decomposition; the combination.
-  const uint64_t start = GridFrames::bytes(grid_, static_cast<int>(looks)) +
-                         std::max<uint64_t>({GridFrames::bytes(grid_, snapshots + 1),
-                                             stable_frames_bytes(grid_, looks), pixels()});
+  const uint64_t start = GridFrames::bytes(grid_, static_cast<int>(looks) + 1) +
+                         std::max<uint64_t>({light_of_bytes(grid_, threads),
+                                             stable_frames_bytes(grid_, looks, threads),
+                                             pixels() + blur_bytes(reference_.width, threads)});
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
   const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
   return kept + made + scene +
@@ -229,58 +232,73 @@ void RobustLearner::set_sample_step(int step) {
 void RobustLearner::start(const SnapshotRange& snapshots) {
   const int m = snapshots.size();
   const GridFrames& cells = room_.frames->cells();
-  GridFrames frames(grid_, m);
-  for (int t = 0; t < m; ++t)
-    for (int c = 0; c < kChannels; ++c)
-      std::copy_n(cells.plane(snapshots.slot(t), c), grid_.cells(), frames.plane(t, c));
-  gains_ = light_of(frames, m);
-
-  const int of_window = std::min(m, parameters_.start_frames);
-  const int old = memory_.older_than(first_number());
-  const int count = of_window + old;
-  std::vector<LitPicture> pictures(static_cast<size_t>(count));
-  GridFrames chosen(grid_, count + 1);
-  const auto choose = [&](const GridFrames& from, int frame, int i, const LitPicture& picture) {
-    pictures[static_cast<size_t>(i)] = picture;
-    for (int c = 0; c < kChannels; ++c) {
-      const float inverse = 1 / picture.gain[static_cast<size_t>(c)];
-      std::transform(from.plane(frame, c), from.plane(frame, c) + grid_.cells(), chosen.plane(i, c),
-                     [inverse](float level) { return level * inverse; });
-    }
-  };
+  GridPictures frames(grid_.cells());
+  frames.reserve(m);
+  for (int t = 0; t < m; ++t) frames.add(cells.plane(snapshots.slot(t), 0));
   // What was seen before, in the light of this window.
   GridFrames here;
-  if (old > 0 || earlier_.known()) here = median_frame(frames, m, gains_);
-  LightScratch scratch(grid_.cells());
-  for (int i = 0; i < old; ++i)
-    choose(memory_.cells(), memory_.slot(i), i,
-           {{memory_.plane(i, 0), memory_.plane(i, 1), memory_.plane(i, 2)},
-            light_over(memory_.cells(), memory_.slot(i), here, 0, &scratch),
-            memory_.shape()});
-  for (int i = 0; i < of_window; ++i) {
-    const int t = static_cast<int>(int64_t{i} * m / of_window);
-    choose(frames, t, old + i,
-           {{snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
-            gains_[static_cast<size_t>(t)],
-            snapshots.shape()});
+  const int old = memory_.older_than(first_number());
+  const bool recalls = old > 0 || earlier_.known();
+  gains_ = light_of(frames, m, room_.pool, recalls ? &here : nullptr);
+
+  const int of_window = std::min(m, parameters_.start_frames);
+  const int count = of_window + old;
+  std::vector<LitPicture> pictures(static_cast<size_t>(count));
+  if (old > 0) {
+    std::vector<LightScratch> scratch;
+    for (size_t i = 0; i < room_.pool->threads(); ++i) scratch.emplace_back(grid_.cells());
+    room_.pool->run(static_cast<size_t>(old), [&](size_t i, size_t worker) {
+      const int k = static_cast<int>(i);
+      pictures[i] = {{memory_.plane(k, 0), memory_.plane(k, 1), memory_.plane(k, 2)},
+                     light_over(memory_.cells(), memory_.slot(k), here, 0, &scratch[worker]),
+                     memory_.shape()};
+    });
   }
-  // What follows takes as much once more.
-  frames = {};
+  const auto frame_of = [&](int i) { return static_cast<int>(int64_t{i} * m / of_window); };
+  for (int i = 0; i < of_window; ++i) {
+    const int t = frame_of(i);
+    pictures[static_cast<size_t>(old + i)] = {
+        {snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
+        gains_[static_cast<size_t>(t)],
+        snapshots.shape()};
+  }
   Recollection recollection;
   if (earlier_.known()) {
-    pictures.emplace_back();
-    const Gain gain = light_over(earlier_.cells(), 0, here, 0, &scratch);
-    choose(earlier_.cells(), 0, count, earlier_.picture(gain));
+    LightScratch scratch(grid_.cells());
+    pictures.push_back(earlier_.picture(light_over(earlier_.cells(), 0, here, 0, &scratch)));
     recollection = earlier_.recollection(parameters_.earlier_share * static_cast<float>(count));
     recollection.older_frames = old;
+  }
+  // Their cells in unit light: as they are, where that is theirs. Memory that nobody needs is not
+  // touched.
+  const size_t of_picture = kChannels * grid_.cells();
+  const auto unlit = std::make_unique_for_overwrite<float[]>(pictures.size() * of_picture);
+  GridPictures chosen(grid_.cells());
+  chosen.reserve(static_cast<int>(pictures.size()));
+  for (int i = 0; i < static_cast<int>(pictures.size()); ++i) {
+    const float* const from = i == count ? earlier_.cells().plane(0, 0)
+                              : i < old  ? memory_.cells().plane(memory_.slot(i), 0)
+                                         : frames.plane(frame_of(i - old), 0);
+    const LitPicture& picture = pictures[static_cast<size_t>(i)];
+    if (!is_lit(picture.gain)) {
+      chosen.add(from);
+      continue;
+    }
+    float* const to = unlit.get() + static_cast<size_t>(i) * of_picture;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const float inverse = 1 / picture.gain[c];
+      const float* const channel = from + c * grid_.cells();
+      std::transform(channel, channel + grid_.cells(), to + c * grid_.cells(),
+                     [inverse](float level) { return level * inverse; });
+    }
+    chosen.add(to);
   }
   FirstLooks first_looks;
   if (absorbed_now_.any()) {
     std::vector<int64_t> numbers(static_cast<size_t>(count));
     for (int i = 0; i < count; ++i)
       numbers[static_cast<size_t>(i)] =
-          i < old ? memory_.number(i)
-                  : first_number() + stride_ * (int64_t{i - old} * m / of_window);
+          i < old ? memory_.number(i) : first_number() + stride_ * frame_of(i - old);
     first_looks = absorbed_now_.first_looks(numbers);
   }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
@@ -298,14 +316,21 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   std::vector<uint8_t> spread(pixels());
   median_picture(grid_, band_, stable_, pictures, room_.pool, background, spread.data());
   recall_spread(&spread);
-  blur(spread.data(), reference_.width, reference_.height, spread_.data());
-  for (size_t p = 0; p < pixels(); ++p) {
-    // In steps of 1/4 level.
-    const int wide = spread_[p];
-    reference_.threshold[p] = static_cast<uint8_t>(
+  blur(spread.data(), reference_.width, reference_.height, room_.pool, spread_.data());
+  // Of each spread, in steps of 1/4 level.
+  std::array<uint8_t, 256> threshold, reach;
+  for (int wide = 0; wide < 256; ++wide) {
+    const auto at = static_cast<size_t>(wide);
+    threshold[at] = static_cast<uint8_t>(
         std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
-    reach_[p] = static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
+    reach[at] = static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
   }
+  in_runs([&](size_t first, size_t size) {
+    for (size_t p = first; p < first + size; ++p) {
+      reference_.threshold[p] = threshold[spread_[p]];
+      reach_[p] = reach[spread_[p]];
+    }
+  });
 }
 
 // One picture has no spread: the one that an earlier window found.
@@ -381,12 +406,20 @@ void RobustLearner::combine(const SnapshotRange& snapshots, bool deep, Backgroun
 // The next background picture: L(t) in unit light.
 void RobustLearner::take_reference(BackgroundModel* model, double t) {
   model->set_time(t);
-  for (size_t first = 0; first < pixels(); first += kMaxRun) {
-    const size_t count = std::min(kMaxRun, pixels() - first);
+  in_runs([&](size_t first, size_t count) {
     uint8_t* const out[3] = {reference_.level[0].data() + first, reference_.level[1].data() + first,
                              reference_.level[2].data() + first};
     model->evaluate(first, count, out);
-  }
+  });
+}
+
+// Calls work(first, count) for runs of all pixels, at most kMaxRun each, on the pool's threads.
+template <typename Work>
+void RobustLearner::in_runs(const Work& work) {
+  room_.pool->run((pixels() + kMaxRun - 1) / kMaxRun, [&](size_t part) {
+    const size_t first = part * kMaxRun;
+    work(first, std::min(kMaxRun, pixels() - first));
+  });
 }
 
 // The light of the frames by sampled pixels.
@@ -485,7 +518,7 @@ void RobustLearner::keep_some() {
     const int64_t number = first_number() + i;
     if ((number - stream_from_) % kRememberedStep != 0 || number <= memory_.newest()) continue;
     memory_.keep(number, *snapshots_, i, room_.frames->cells(),
-                 int64_t{kRememberedWindows} * room_.window_size);
+                 int64_t{kRememberedWindows} * room_.window_size, room_.pool);
   }
 }
 

@@ -130,6 +130,8 @@ class RobustLearner : public Learner {
   void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                     BackgroundModel* model) const;
   void end(BackgroundModel* model);
+  template <typename Work>
+  void in_runs(const Work& work);
 
   // Hops that are left out between two solves, at most.
   static constexpr int kMostCalm = 3;

@@ -25,11 +25,11 @@ constexpr double kNearest = 0.05;
 // The picture that takes each cell from the frame `from`.
 class GridPicture {
  public:
-  GridPicture(const GridFrames& frames, const std::vector<int>& from) : cells_(from.size()) {
+  GridPicture(const GridPictures& frames, const std::vector<int>& from) : cells_(from.size()) {
     levels_.resize(kChannels * cells_);
     for (size_t cell = 0; cell < cells_; ++cell) take(frames, from[cell], cell);
   }
-  void take(const GridFrames& frames, int frame, size_t cell) {
+  void take(const GridPictures& frames, int frame, size_t cell) {
     for (int c = 0; c < kChannels; ++c)
       levels_[static_cast<size_t>(c) * cells_ + cell] = frames.plane(frame, c)[cell];
   }
@@ -45,7 +45,7 @@ class GridPicture {
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
 // a contour that the true background does not have.
-void compare_contours(const Grid& grid, const GridFrames& frames, int count,
+void compare_contours(const Grid& grid, const GridPictures& frames, int count,
                       const std::vector<float>& density, std::vector<int>* from) {
   if (std::min(grid.rows, grid.cols) < 4 || count < 3) return;
   const size_t cells = grid.cells();
@@ -88,29 +88,58 @@ void compare_contours(const Grid& grid, const GridFrames& frames, int count,
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
 // too little of it is seen in any new frame.
 bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recollection& earlier,
-                      std::vector<float>* density) {
-  std::vector<float> alike(cells);
+                      Pool* pool, std::vector<float>* density) {
+  std::vector<float> rooms(cells * pool->threads());
   float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
   std::fill_n(of_earlier, cells, 0.0f);
-  const auto add = [&](int first, int end) {
-    for (int t = first; t < end; ++t) {
-      patches->alike(t, count, alike.data());
-      for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += alike[cell];
-    }
+  // what(t, alike, first, end) for frames first_frame .. end_frame - 1 at the cells of each part.
+  const auto compare = [&](int first_frame, int end_frame, const auto& what) {
+    pool->run(static_cast<size_t>(patches->parts()), [&](size_t index, size_t worker) {
+      const int part = static_cast<int>(index);
+      float* const alike = rooms.data() + worker * cells;
+      for (int t = first_frame; t < end_frame; ++t) {
+        patches->alike(t, count, part, worker, alike);
+        what(t, alike, patches->first_cell(part), patches->first_cell(part + 1));
+      }
+    });
   };
-  add(earlier.older_frames, count);
+  const auto add = [&](int, const float* alike, size_t first, size_t end) {
+    for (size_t cell = first; cell < end; ++cell) of_earlier[cell] += alike[cell];
+  };
+  compare(earlier.older_frames, count, add);
   const auto seen = std::count_if(of_earlier, of_earlier + cells,
                                   [](float frames_alike) { return frames_alike > 0; });
   if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
-  add(0, earlier.older_frames);
-  for (int t = 0; t < count; ++t) {
-    patches->alike(t, count, alike.data());
+  compare(0, earlier.older_frames, add);
+  compare(0, count, [&](int t, const float* alike, size_t first, size_t end) {
     float* of_frame = density->data() + static_cast<size_t>(t) * cells;
-    for (size_t cell = 0; cell < cells; ++cell)
+    for (size_t cell = first; cell < end; ++cell)
       of_frame[cell] += earlier.weight[cell] * alike[cell];
-  }
+  });
   for (size_t cell = 0; cell < cells; ++cell) of_earlier[cell] += earlier.weight[cell];
   return true;
+}
+
+// Of each cell the look with the largest density, the first one of equals.
+std::vector<int> densest(const std::vector<float>& density, size_t cells, Pool* pool) {
+  // Cells at a time: theirs stay in registers and in the first cache.
+  constexpr size_t kTogether = 256;
+  std::vector<int> from(cells, 0);
+  pool->run((cells + kTogether - 1) / kTogether, [&](size_t part) {
+    const size_t first = part * kTogether, count = std::min(kTogether, cells - first);
+    float most[kTogether];
+    int look[kTogether] = {};
+    std::copy_n(density.data() + first, count, most);
+    for (size_t t = 1; t < density.size() / cells; ++t) {
+      const float* const of_frame = density.data() + t * cells + first;
+      for (size_t i = 0; i < count; ++i) {
+        look[i] = of_frame[i] > most[i] ? static_cast<int>(t) : look[i];
+        most[i] = std::max(most[i], of_frame[i]);
+      }
+    }
+    std::copy_n(look, count, from.data() + first);
+  });
+  return from;
 }
 
 // How far a frame that shows the background may be: distance, of all frames less one. scratch: as
@@ -133,7 +162,7 @@ float limit_of(std::span<const float> distance, size_t left_out, std::span<float
 
 }  // namespace
 
-StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
+StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
                                 const FirstLooks& first_looks) {
   const size_t cells = grid.cells();
@@ -142,7 +171,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   {
     PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
     patches.density(count, pool, density.data());
-    if (earlier && !add_recollection(cells, &patches, count, *earlier, &density)) {
+    if (earlier && !add_recollection(cells, &patches, count, *earlier, pool, &density)) {
       result.another_scene = true;
       earlier = nullptr;
       density.resize(cells * static_cast<size_t>(count));
@@ -157,15 +186,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
     for (int t = 0; t < looks; ++t)
       for (size_t cell = 0; cell < cells; ++cell)
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
-  std::vector<int> from(cells, 0);
-  std::vector<float> most(density.begin(), density.begin() + static_cast<ptrdiff_t>(cells));
-  for (int t = 1; t < looks; ++t) {
-    const float* of_frame = density.data() + static_cast<size_t>(t) * cells;
-    for (size_t cell = 0; cell < cells; ++cell) {
-      from[cell] = of_frame[cell] > most[cell] ? t : from[cell];
-      most[cell] = std::max(most[cell], of_frame[cell]);
-    }
-  }
+  std::vector<int> from = densest(density, cells, pool);
   compare_contours(grid, frames, count, density, &from);
 
   std::vector<float>().swap(density);
@@ -203,8 +224,9 @@ StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int 
   return result;
 }
 
-uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks) {
-  return std::max(sizeof(float) * looks * grid.cells() + PatchFrames::bytes(grid, looks),
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads) {
+  const uint64_t rooms = sizeof(float) * static_cast<uint64_t>(threads) * grid.cells();
+  return std::max(sizeof(float) * looks * grid.cells() + PatchFrames::bytes(grid, looks) + rooms,
                   patch_distance_bytes(grid, looks));
 }
 

@@ -78,10 +78,10 @@ struct FirstLooks {
 // where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
 // around it that most frames share (the mode of the patches' density), corrected where another
 // frame's region fits its surroundings better: what stands still for long shows by its contour.
-StableFrames find_stable_frames(const Grid& grid, const GridFrames& frames, int count,
+StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
                                 const FirstLooks& first_looks = {});
 // The memory that it takes while it looks for them.
-uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks);
+uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads);
 
 }  // namespace qdmd
