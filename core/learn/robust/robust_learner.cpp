@@ -24,13 +24,30 @@ int chosen_step(int width, int height) {
 constexpr size_t kFewestSamples = 28;
 
 // Every second frame of a window like the default's tells nearly as much of its background as all
-// do, in half of the time. Fewer frames than kLeastSnapshots tell less; a window of kLong frames
-// and more is for the best background that there is.
-constexpr int kLeastSnapshots = 50, kLong = 200;
-int stride_of(int frames) { return frames >= 2 * kLeastSnapshots && frames < kLong ? 2 : 1; }
-int most_snapshots(int window_size) {
-  if (window_size >= kLong) return window_size;
-  return std::max(std::min(window_size, 2 * kLeastSnapshots - 1), (window_size + 1) / 2);
+// do, in half of the time. Fewer than `least` snapshots tell less. Windows that overlap see most
+// frames again: every third one is enough there. A window of kLong frames and more is for the best
+// background that there is.
+constexpr int kLong = 200;
+struct Thinning {
+  int least, most_stride;
+
+  int stride_of(int frames) const {
+    return frames < kLong ? std::clamp(frames / least, 1, most_stride) : 1;
+  }
+  int snapshots_of(int frames) const {
+    const int stride = stride_of(frames);
+    return (frames + stride - 1) / stride;
+  }
+  // Of windows that grow up to this size.
+  int most_snapshots(int window_size) const {
+    int most = 0;
+    for (int frames = 1; frames <= window_size; ++frames)
+      most = std::max(most, snapshots_of(frames));
+    return most;
+  }
+};
+constexpr Thinning thinning_of(Models models) {
+  return models == Models::two_of_live ? Thinning{33, 3} : Thinning{50, 2};
 }
 
 // One frame in so many may be remembered, for so many windows.
@@ -92,7 +109,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
   const auto workers = static_cast<uint64_t>(threads);
   DmdOptions dmd = options_.dmd;
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
-  const int snapshots = most_snapshots(window_size), remembered = remembered_frames(window_size);
+  const int snapshots = thinning_of(models).most_snapshots(window_size), remembered = remembered_frames(window_size);
   const auto looks =
       static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) + remembered + 1);
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
@@ -131,7 +148,7 @@ double RobustLearner::solve_seconds(int window_size) const {
   // Passes over pixels, and over the grid, which has at most so many cells as small pictures have
   // pixels.
   const double n = static_cast<double>(pixels()), small = std::min(1.0, n / 3000);
-  const int snapshots = (window_size + stride_of(window_size) - 1) / stride_of(window_size);
+  const int snapshots = thinning_of(Models::two).snapshots_of(window_size);
   return options_.iterations * (1e-3 * small + snapshots * (2.5e-4 * small + 2.2e-9 * n));
 }
 
@@ -143,7 +160,7 @@ uint64_t RobustLearner::solver_bytes(int window_size) const {
 
 void RobustLearner::begin(const LearnerRoom& room) {
   room_ = room;
-  const int snapshots = most_snapshots(room.window_size);
+  const int snapshots = thinning_of(room.models).most_snapshots(room.window_size);
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
   background_cells_ = GridFrames(grid_, 2);
@@ -462,7 +479,7 @@ void RobustLearner::decompose(const SnapshotRange& snapshots) {
 }
 
 void RobustLearner::build(Slice, BackgroundModel* model) {
-  stride_ = stride_of(snapshots_->size());
+  stride_ = thinning_of(room_.models).stride_of(snapshots_->size());
   const SnapshotRange snapshots = snapshots_->every(stride_);
   const Clock::Spent before = room_.clock->spent();
   facts_ = {};
