@@ -6,6 +6,7 @@ namespace qdmd {
 namespace {
 
 using State = Background::State;
+using Seconds = std::chrono::duration<double>;
 
 }  // namespace
 
@@ -71,7 +72,7 @@ void LiveSchedule::settle() {
     return;
   }
   wait();
-  if (piece_) work_of_frame_ = workers().done() / piece_->size;
+  if (piece_) seconds_of_estimate_ = Seconds(workers().done()).count() / piece_->estimate;
   piece_.reset();
   publish();
 }
@@ -81,7 +82,9 @@ void LiveSchedule::wait_for_share() {
   // No solve is exactly as much work as the one before: the frame that it is due with does not wait
   // for what is more.
   const auto frames = plan_.frames() + 1 - piece_->from, all = piece_->due - piece_->from;
-  workers().help_until_done(work_of_frame_ * piece_->size * frames * 5 / (4 * all));
+  const double share = 1.25 * static_cast<double>(frames) / static_cast<double>(all);
+  const Seconds work(share * seconds_of_estimate_ * piece_->estimate);
+  workers().help_until_done(std::chrono::duration_cast<Pool::Time::duration>(work));
 }
 
 void LiveSchedule::publish() {
@@ -107,7 +110,9 @@ void LiveSchedule::begin_work() {
     if (!step.solve) return;
     background().begin(span);
     build_ = Build{1, 0, first_frame};
-    if (!at_once) piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices, size};
+    if (!at_once)
+      piece_ = Piece{plan_.frames(), plan_.frames() + step.build_slices,
+                     background().learner().solve_seconds(size, Models::two_of_live)};
   } else if (step.group > 0) {
     group_ = GramGroup{span,       step.group,        step.gram_slices, 0,
                        step.solve, step.build_slices, first_frame};

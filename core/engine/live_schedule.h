@@ -45,7 +45,7 @@ class LiveSchedule : public Schedule {
   // that the last solve was is done.
   struct Piece {
     int64_t from, due;
-    int size;  // of its window
+    double estimate;  // Learner::solve_seconds()
   };
 
   // Of the newest frame.
@@ -72,7 +72,7 @@ class LiveSchedule : public Schedule {
   Moment published_;         // when the model in use was published
   int64_t model_start_ = 0;  // the frame at time 0 of the model in use, counted like first_frame
   std::optional<Piece> piece_;
-  std::chrono::nanoseconds work_of_frame_{};  // of the last piece, for each frame of its window
+  double seconds_of_estimate_ = 0;  // that threads worked in the last piece, for each estimated one
   // The side thread's while it works.
   std::optional<GramGroup> group_;
   std::optional<Build> build_;

@@ -81,7 +81,7 @@ bool GramLearner::may_read_frames(int window_size) const {
   return !keeps_shared() && BackgroundModel::may_combine_directly(pictures, window_size);
 }
 
-double GramLearner::solve_seconds(int window_size) const {
+double GramLearner::solve_seconds(int window_size, Models) const {
   const double m = window_size, n = static_cast<double>(width_) * height_;
   // The pictures, which read the window once, and a small problem; or a factorization of pixels.
   double seconds = 1e-9 * n * m + 2e-8 * m * m * m;

@@ -20,7 +20,7 @@ class GramLearner : public Learner {
   bool in_one_piece() const override { return false; }
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
   bool may_read_frames(int window_size) const override;
-  double solve_seconds(int window_size) const override;
+  double solve_seconds(int window_size, Models models) const override;
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;

@@ -76,8 +76,8 @@ class Learner {
   virtual bool may_read_frames(int window_size) const = 0;
   // Bytes more where the store's frames come to share no samples (FrameStore::steady()).
   virtual uint64_t bytes_to_unshare() const { return 0; }
-  // Estimate of the seconds of a solve, with two threads of a machine of 2024.
-  virtual double solve_seconds(int window_size) const = 0;
+  // Estimate of the seconds of a solve of so many frames, with two threads of a machine of 2024.
+  virtual double solve_seconds(int frames, Models models) const = 0;
   // Estimate of the bytes of a solver that works on pixels; 0: it works on the Gram matrix.
   virtual uint64_t solver_bytes(int window_size) const = 0;
 

@@ -109,7 +109,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
   const auto workers = static_cast<uint64_t>(threads);
   DmdOptions dmd = options_.dmd;
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
-  const int snapshots = thinning_of(models).most_snapshots(window_size), remembered = remembered_frames(window_size);
+  const int snapshots = thinning_of(models).most_snapshots(window_size),
+            remembered = remembered_frames(window_size);
   const auto looks =
       static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) + remembered + 1);
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
@@ -144,11 +145,11 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                    filling});
 }
 
-double RobustLearner::solve_seconds(int window_size) const {
+double RobustLearner::solve_seconds(int window_size, Models models) const {
   // Passes over pixels, and over the grid, which has at most so many cells as small pictures have
   // pixels.
   const double n = static_cast<double>(pixels()), small = std::min(1.0, n / 3000);
-  const int snapshots = thinning_of(Models::two).snapshots_of(window_size);
+  const int snapshots = thinning_of(models).snapshots_of(window_size);
   return options_.iterations * (1e-3 * small + snapshots * (2.5e-4 * small + 2.2e-9 * n));
 }
 

@@ -71,7 +71,7 @@ class RobustLearner : public Learner {
   uint64_t bytes_to_unshare() const override {
     return FrameMemory::bytes_to_unshare(remembered_frames(room_.window_size), shape());
   }
-  double solve_seconds(int window_size) const override;
+  double solve_seconds(int window_size, Models models) const override;
   uint64_t solver_bytes(int window_size) const override;
 
   void begin(const LearnerRoom& room) override;
