@@ -127,11 +127,14 @@ void Background::rehearse(const MaskWishes& wishes) {
         {},    &model,          foreground.threshold, fixed ? nullptr : model.limits(),
         fixed, &wishes.ignored, wishes.shadows};
     read_planes(snapshots_->picture(t), room.data(), frame.x);
+    const SnapshotRange whole = room_.frames->whole(*snapshots_);
+    for (int c = 0; c < kChannels && whole.low_bits() > 0; ++c)
+      frame.low[c] = whole.low_plane(t, c);
     decision_.decide(frame, room_.pool);
   }
 }
 
-void Background::decide(const uint8_t* const x[3], Pool* pool) {
+void Background::decide(const uint8_t* const x[3], const uint8_t* const low[3], Pool* pool) {
   const bool fixed = wishes_.threshold > 0;
   decision_.decide({{x[0], x[1], x[2]},
                     &model(),
@@ -139,7 +142,8 @@ void Background::decide(const uint8_t* const x[3], Pool* pool) {
                     fixed ? nullptr : model().limits(),
                     fixed,
                     &wishes_.ignored,
-                    wishes_.shadows},
+                    wishes_.shadows,
+                    {low[0], low[1], low[2]}},
                    pool);
 }
 

@@ -87,8 +87,9 @@ class Background {
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 
-  // Decides the pixels of a frame, whose planes are x, against L; frames come in order.
-  void decide(const uint8_t* const x[3], Pool* pool);
+  // Decides the pixels of a frame, whose planes are x, against L; frames come in order. low: of
+  // samples of more than 8 bits what is below the highest 8, else nulls.
+  void decide(const uint8_t* const x[3], const uint8_t* const low[3], Pool* pool);
   // What it decided last.
   Decision& decision() { return decision_; }
   const Decision& decision() const { return decision_; }

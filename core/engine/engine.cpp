@@ -228,7 +228,7 @@ void Engine::read_next(int slot, const uint8_t* planes[kChannels]) {
 
 // Once a frame.
 void Engine::decide_next(OutputTask* task) {
-  if (!decided_) background_->decide(task->x, workers_->idle_pool());
+  if (!decided_) background_->decide(task->x, task->low, workers_->idle_pool());
   decided_ = true;
   task->mask = background_->decision().mask();
   task->shaded = background_->decision().shaded();

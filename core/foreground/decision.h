@@ -36,6 +36,8 @@ struct Comparison {
   // Where all is background, whatever the frame shows, and nothing is learnt from it; or null.
   const IgnoredAreas* ignored = nullptr;
   Shadows shadows = Shadows::background;
+  // Of samples of more than 8 bits what is below the highest 8 of x; or nulls.
+  const uint8_t* low[3] = {nullptr, nullptr, nullptr};
 };
 
 // A pixel that differs from L is foreground unless
@@ -46,7 +48,10 @@ struct Comparison {
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
 //     foreground, too,
 //   - it belongs to a part that is too small; holes that are too small are foreground (Specks).
-// In much noise, means of 3 x 3 pixels are compared. Learns from the frames that it decides, which
+// In much noise, means of 3 x 3 pixels are compared. Of samples of more than 8 bits a pixel's own
+// distance from L is that of whole samples; means, what is around, and light are compared in the
+// highest 8 bits, noise is learnt from them, and where the user's threshold is so low that these
+// need not differ at all, light is not looked at. Learns from the frames that it decides, which
 // come in the stream's order.
 class Decision {
  public:
@@ -108,6 +113,9 @@ class Decision {
     Comparison frame = {};
     Pool* pool = nullptr;
     bool means = false, textures = false;
+    bool whole = false;  // samples have more than 8 bits, and the user's threshold or own distances
+                         // are compared with all of them
+    bool below = false;  // pixels may differ that are the same in 8 bits
     double threshold = 0;
     bool level_known = false;  // L is still that of the frame before
   };
@@ -135,10 +143,14 @@ class Decision {
   void look(int parts);
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
+  void compare_whole(const uint8_t* const x[3], const uint8_t* const level[3], size_t first,
+                     size_t count, uint8_t* differing) const;
+  void whole_distance(size_t first, size_t count, uint64_t* units) const;
   void compare_means(int first_row, int row_count);
   void explain(int grid_row);
   void explain_run(int y, int left, int right, int grid_row);
   void look_at(Run* run);
+  void look_at_whole(Run* run) const;
   void look_around(Run* run);
   void leave_shadows(const Run& run);
   void learn(int first_row, int row_count);

@@ -21,6 +21,7 @@ class BackgroundModel {
   // in levels of the highest eight all the same, and evaluate_deep() knows more of it. Before all
   // others.
   void set_low_bits(int bits) { low_bits_ = bits; }
+  int low_bits() const { return low_bits_; }
 
   // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
   // direct, until the next build.

@@ -152,6 +152,20 @@ void fade_row(const uint16_t* HWY_RESTRICT x, const uint8_t* HWY_RESTRICT alpha,
   }
 }
 
+// A plain loop, which the compiler makes vectors of.
+void squared_units(const uint8_t* const* high, const uint8_t* const* low, int low_bits,
+                   const uint16_t* const* l, size_t count, uint64_t* HWY_RESTRICT out) {
+  const uint8_t *hr = high[0], *hg = high[1], *hb = high[2];
+  const uint8_t *lr = low[0], *lg = low[1], *lb = low[2];
+  const uint16_t *r = l[0], *g = l[1], *b = l[2];
+  const auto square = [low_bits](uint8_t of_high, uint8_t of_low, uint16_t of_l) HWY_ATTR {
+    const int64_t difference = (of_high << low_bits) + of_low - of_l;
+    return static_cast<uint64_t>(difference * difference);
+  };
+  for (size_t p = 0; p < count; ++p)
+    out[p] = square(hr[p], lr[p], r[p]) + square(hg[p], lg[p], g[p]) + square(hb[p], lb[p], b[p]);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace qdmd
 HWY_AFTER_NAMESPACE();
@@ -160,6 +174,7 @@ HWY_AFTER_NAMESPACE();
 namespace qdmd {
 namespace {
 
+HWY_EXPORT(squared_units);
 HWY_EXPORT(split_row);
 HWY_EXPORT(join_row);
 HWY_EXPORT(put_row);
@@ -227,6 +242,11 @@ void residual_levels(const uint16_t* x, const uint16_t* l, uint16_t black, uint1
 
 void fade(const uint16_t* x, const uint8_t* alpha, uint16_t black, size_t count, uint16_t* out) {
   HWY_DYNAMIC_DISPATCH(fade_row)(x, alpha, black, count, out);
+}
+
+void squared_units(const uint8_t* const high[3], const uint8_t* const low[3], int low_bits,
+                   const uint16_t* const l[3], size_t count, uint64_t* out) {
+  HWY_DYNAMIC_DISPATCH(squared_units)(high, low, low_bits, l, count, out);
 }
 
 }  // namespace qdmd

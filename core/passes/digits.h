@@ -26,6 +26,11 @@ void put_words(const uint16_t* samples, SampleBits bits, size_t count, uint8_t* 
 void put_pairs(const uint16_t* const samples[2], SampleBits bits, size_t count, uint8_t* to);
 void put_fours(const uint16_t* const samples[4], SampleBits bits, size_t count, uint8_t* to);
 
+// out[p] = the squared quaternion norm of x[p] - l[p] in units of the lowest bit. high, low: x's
+// digits, R, G, B; l: whole samples.
+void squared_units(const uint8_t* const high[3], const uint8_t* const low[3], int low_bits,
+                   const uint16_t* const l[3], size_t count, uint64_t* out);
+
 // What core/passes/chroma.h and soft_edge.h have for bytes.
 
 // out[k] = the mean of those of above[2 k], above[2 k + 1], below[2 k] and below[2 k + 1] that

@@ -102,7 +102,7 @@ class Batch {
                              nullptr,
                              nullptr,
                              255};
-    background_.decide(task.x, &pool_);
+    background_.decide(task.x, task.low, &pool_);
     const auto bands = static_cast<int>(std::max<size_t>(1, window.pixels() / kPixelsPerBand));
     for_bands(pool_, c_.height, bands, [&](int first, int count, size_t) {
       write_output(task, view_of(c_, out_.data()), first, count);

@@ -320,6 +320,101 @@ TEST(DeepRobust, FindsTheGroundBehindWhatMoves) {
     }
 }
 
+// ---- Masks ----
+
+// Frames whose highest 8 bits are the same, or nearly, and thresholds above and below a level; with
+// pictures so small that no pixel around another one has a say.
+TEST(DeepMasks, AreDecidedOnWholeSamples) {
+  for (int depth : {10, 12, 16})
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (double threshold : {0.3, 1.0, 1.7, 2.0, 2.9, 18.0, 18.3}) {
+        std::mt19937 rng(39);
+        auto frames = make_frames(depth, rng, 0.2, false);
+        const int unit = 1 << (depth - 8);
+        // Somebody about as far from the ground as the threshold.
+        std::uniform_real_distribution<double> around(0, 1.5 * threshold);
+        for (size_t t = 4; t < frames.size(); t += 3)
+          for (size_t i = 0; i < 3 * kPixels; ++i)
+            if (i % kPixels % 3 == 0)
+              frames[t][i] =
+                  std::min(frames[t][i] + static_cast<int>(around(rng) * unit), 256 * unit - 1);
+        EngineOptions options = options_of(depth, Method::robust, kFrames);
+        options.mode = mode;
+        options.foreground_threshold = threshold;
+        Engine engine;
+        ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+        engine.set_shadows(Shadows::foreground);
+        DeepPicture in({depth, 0}, true), background({depth, 0}, true), mask({depth, 0}, true);
+        size_t popped = 0, differ = 0;
+        const auto take = [&] {
+          for (; engine.ready(); engine.skip()) {
+            engine.write(Output::background, options.levels, background.view<uint8_t>());
+            engine.write(Output::mask, options.levels, mask.view<uint8_t>());
+            const Frame x = frames[popped++], l = background.samples(), seen = mask.samples();
+            for (size_t p = 0; p < kPixels; ++p) {
+              double squared = 0;
+              for (size_t c = 0; c < 3; ++c) {
+                const double distance = x[c * kPixels + p] - l[c * kPixels + p];
+                squared += distance * distance;
+              }
+              const bool expected = std::sqrt(squared) > threshold * unit;
+              ASSERT_EQ(seen[p] > 0, expected) << depth << " bits, " << threshold;
+              differ += expected;
+            }
+          }
+        };
+        for (const Frame& frame : frames) {
+          in.fill(frame);
+          ASSERT_TRUE(engine.push(in.view<const uint8_t>()).ok());
+          take();
+        }
+        ASSERT_TRUE(engine.drain().ok());
+        take();
+        ASSERT_EQ(popped, size_t{kFrames});
+        EXPECT_GT(differ, kPixels / 20) << threshold;
+        EXPECT_LT(differ, kFrames * kPixels * 3 / 4) << threshold;
+      }
+}
+
+// A thermal camera that uses few of its bits: a hand that is a third of a level warmer.
+TEST(DeepMasks, FindWhatHighBitsDoNotShow) {
+  constexpr int kSide = 150, kLength = 12;
+  EngineOptions options = options_of(16, Method::robust, kLength);
+  options.colours = Colours::grey;
+  options.foreground_threshold = 0.2;
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kSide, kSide).ok());
+  std::vector<uint16_t> words(kSide * kSide);
+  BasicImageView<const uint8_t> in;
+  in.width = in.height = kSide;
+  in.bits = {16, 0};
+  in.pixel_stride = 2, in.row_stride = 2 * kSide;
+  for (auto& channel : in.channel) channel = reinterpret_cast<const uint8_t*>(words.data());
+  const auto inside = [](int t, int x, int y) {
+    return t >= 6 && t < 9 && x >= 50 && x < 90 && y >= 40 && y < 80;
+  };
+  std::mt19937 rng(40);
+  std::normal_distribution<double> noise(0, 4);
+  for (int t = 0; t < kLength; ++t) {
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x)
+        words[static_cast<size_t>(y * kSide + x)] =
+            static_cast<uint16_t>(0x1040 + std::lround(noise(rng)) + (inside(t, x, y) ? 85 : 0));
+    ASSERT_TRUE(engine.push(in).ok());
+  }
+  ASSERT_TRUE(engine.drain().ok());
+  for (int t = 0; t < kLength; ++t) {
+    ASSERT_TRUE(engine.ready());
+    const uint8_t* const mask = engine.whole_mask();
+    int wrong = 0;
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) wrong += (mask[y * kSide + x] != 0) != inside(t, x, y);
+    // Corners, which vote.
+    EXPECT_LE(wrong, 16) << t;
+    engine.skip();
+  }
+}
+
 // ---- A ramp ----
 
 // 512 shades of half a level.

@@ -3,6 +3,7 @@
 #include "core/passes/digits.h"
 
 #include <cmath>
+#include <deque>
 #include <random>
 #include <vector>
 
@@ -91,6 +92,35 @@ TEST(Words, AreWrittenInPairsAndFours) {
             }
             ASSERT_EQ(word_at(fours.data() + 8 * p + 2 * c), samples[c][p] << bits.shift);
           }
+      }
+  });
+}
+
+TEST(Digits, OfAPixelAreAsFarFromTheBackgroundAsWholeSamples) {
+  on_every_target([] {
+    for (int low_bits : {2, 4, 8})
+      for (size_t count : kCounts) {
+        std::deque<BeforeTheEdge<uint8_t>> digits;
+        std::deque<BeforeTheEdge<uint16_t>> background;
+        for (int c = 0; c < 3; ++c) {
+          fill_randomly(digits.emplace_back(count), 255);
+          fill_randomly(digits.emplace_back(count), (1 << low_bits) - 1);
+          fill_randomly(background.emplace_back(count), (256 << low_bits) - 1);
+        }
+        const uint8_t* const high[3] = {digits[0].data(), digits[2].data(), digits[4].data()};
+        const uint8_t* const low[3] = {digits[1].data(), digits[3].data(), digits[5].data()};
+        const uint16_t* const l[3] = {background[0].data(), background[1].data(),
+                                      background[2].data()};
+        BeforeTheEdge<uint64_t> out(count);
+        squared_units(high, low, low_bits, l, count, out.data());
+        for (size_t p = 0; p < count; ++p) {
+          int64_t sum = 0;
+          for (int c = 0; c < 3; ++c) {
+            const int64_t x = (int64_t{high[c][p]} << low_bits) + low[c][p];
+            sum += (x - l[c][p]) * (x - l[c][p]);
+          }
+          ASSERT_EQ(out[p], static_cast<uint64_t>(sum));
+        }
       }
   });
 }

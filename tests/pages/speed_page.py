@@ -1,6 +1,8 @@
 """Times whole pipelines, in turns, and puts milliseconds a frame less identity into a page.
 
-usage: speed_page.py PAGE VIDEO FOLDER      VIDEO may be empty: a simulated scene takes its place
+usage: speed_page.py PAGE VIDEO FOLDER LIVE
+VIDEO may be empty: a simulated scene takes its place. LIVE is the benchmark tests/bench/live, which tells what each
+frame of mode=live takes.
 """
 import os
 import statistics
@@ -88,8 +90,26 @@ def milliseconds(video, folder, width, height, frames):
             for name, (form, elements) in CASES.items() if elements != 'identity'}
 
 
+def evenness(live, folder, width, height):
+    """The median frame of mode=live in ms, and how many times that the longest ones take, medians of three runs: of the
+    first ten, of those that fill the window, and of those after."""
+    times = f'{folder}/live-times.txt'
+    rows = []
+    for run in range(3):
+        print(f'\r{width}x{height}: live, run {run + 1} of 3 ', end='', file=sys.stderr)
+        subprocess.run([live, '--unpaced', '--seconds', '24', '--width', str(width), '--height', str(height),
+                        '--times', times], check=True, stdout=subprocess.DEVNULL)
+        with open(times, encoding='ascii') as file:
+            frames = [float(line) for line in file]
+        median = statistics.median(frames[200:])
+        longest = [max(part) / median for part in (frames[:10], frames[10:200], frames[200:])]
+        rows.append((median, *longest))
+    return [statistics.median(column) for column in zip(*rows)]
+
+
 if __name__ == '__main__':
-    target, clip, results = sys.argv[1:]
+    target, clip, results, live_bench = sys.argv[1:]
+    even = [[f'{w}x{h}', *(f'{value:.2f}' for value in evenness(live_bench, results, w, h))] for w, h, _ in SIZES[1:]]
     columns = [milliseconds(clip, results, *size) for size in SIZES]
     print(file=sys.stderr)
     sizes = [f'{w}x{h}' for w, h, _ in SIZES]
@@ -103,6 +123,8 @@ if __name__ == '__main__':
     page.put(target, {
         'speed': page.table(['ms a frame (times as fast as `segmentation`)', *sizes],
                             [row for name, row in rows.items() if CASES[name][0] == 'RGBA']),
+        'even': page.table(['frames of `mode=live`', 'median, ms', 'longest of the first 10', 'of the next 190',
+                            'of the 400 after'], even),
         'speed-formats': page.table(['ms a frame, `output=mask` (times as long as)', *sizes],
                                     [row for name, row in rows.items() if CASES[name][0] != 'RGBA']),
     })
