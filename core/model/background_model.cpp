@@ -150,7 +150,7 @@ void BackgroundModel::use_steady_weights(double t) {
   model_.weights(middle / stride_, &steady_weights_);
   // Lazy products take no memory.
   const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs().lazyProduct(largest_);
-  if (moved.maxCoeff() < kSteadyLevels) time_weights_ = steady_weights_;
+  if (moved.maxCoeff() < kSteadyLevels / (1 << low_bits_)) time_weights_ = steady_weights_;
 }
 
 void BackgroundModel::set_time(double t) {

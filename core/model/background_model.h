@@ -41,7 +41,8 @@ class BackgroundModel {
   // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
   void set_stride(int frames) { stride_ = frames; }
   // Frames of one block of kSteadyFrames share the weights of its middle, if this moves no pixel of
-  // L(t) by kSteadyLevels: L need not be made anew for each of them. Until begin().
+  // L(t) by kSteadyLevels, in units of the samples' lowest bit: L need not be made anew for each of
+  // them. Until begin().
   void make_steady() { steady_ = true; }
   static constexpr int kSteadyFrames = 10;
   static constexpr double kSteadyLevels = 0.25;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/digits.cpp"
@@ -152,18 +153,32 @@ void fade_row(const uint16_t* HWY_RESTRICT x, const uint8_t* HWY_RESTRICT alpha,
   }
 }
 
-// A plain loop, which the compiler makes vectors of.
-void squared_units(const uint8_t* const* high, const uint8_t* const* low, int low_bits,
-                   const uint16_t* const* l, size_t count, uint64_t* HWY_RESTRICT out) {
+// Plain loops, which the compiler makes vectors of; Word holds a sum of three squares.
+template <typename Word>
+HWY_INLINE void add_squares(const uint8_t* const* high, const uint8_t* const* low, int low_bits,
+                            const uint16_t* const* l, size_t count, uint64_t* HWY_RESTRICT out) {
   const uint8_t *hr = high[0], *hg = high[1], *hb = high[2];
   const uint8_t *lr = low[0], *lg = low[1], *lb = low[2];
   const uint16_t *r = l[0], *g = l[1], *b = l[2];
   const auto square = [low_bits](uint8_t of_high, uint8_t of_low, uint16_t of_l) HWY_ATTR {
-    const int64_t difference = (of_high << low_bits) + of_low - of_l;
-    return static_cast<uint64_t>(difference * difference);
+    const auto difference =
+        static_cast<std::make_signed_t<Word>>((of_high << low_bits) + of_low - of_l);
+    return static_cast<Word>(difference * difference);
   };
-  for (size_t p = 0; p < count; ++p)
-    out[p] = square(hr[p], lr[p], r[p]) + square(hg[p], lg[p], g[p]) + square(hb[p], lb[p], b[p]);
+  for (size_t p = 0; p < count; ++p) {
+    const Word sum =
+        square(hr[p], lr[p], r[p]) + square(hg[p], lg[p], g[p]) + square(hb[p], lb[p], b[p]);
+    out[p] = sum;
+  }
+}
+
+void squared_units(const uint8_t* const* high, const uint8_t* const* low, int low_bits,
+                   const uint16_t* const* l, size_t count, uint64_t* HWY_RESTRICT out) {
+  // 3 (2^12)^2 is below 2^32.
+  if (low_bits <= 4)
+    add_squares<uint32_t>(high, low, low_bits, l, count, out);
+  else
+    add_squares<uint64_t>(high, low, low_bits, l, count, out);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -499,7 +499,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       model->begin(snapshots, dark ? mean_of_frames(snapshots.size()) : decomposition.background,
                    true);
       model->set_stride(stride_);
-      if (!deep) model->make_steady();
+      model->make_steady();
       combine(snapshots, deep, model);
       take_reference(model, snapshots_->size() / 2);
     }
