@@ -142,15 +142,19 @@ PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count
     : grid_(grid),
       bands_(std::min(grid.rows, std::max((grid.rows + kBandRows - 1) / kBandRows,
                                           static_cast<int>(pool->threads())))),
-      steps_(static_cast<size_t>(count) * kChannels * grid.cells() + kVector),
+      // Threads touch what is theirs.
+      steps_(std::make_unique_for_overwrite<uint16_t[]>(
+          static_cast<size_t>(count) * kChannels * grid.cells() + kVector)),
       limit_(grid.cells() + kVector),
       sums_(sums_size() * pool->threads()) {
   pool->run(static_cast<size_t>(count), [&](size_t t) {
     // The channels lie one after another in both.
     HWY_DYNAMIC_DISPATCH(to_steps)
     (frames.plane(static_cast<int>(t), 0), kChannels * grid_.cells(),
-     steps_.data() + t * kChannels * grid_.cells());
+     steps_.get() + t * kChannels * grid_.cells());
   });
+  std::fill_n(steps_.get() + static_cast<size_t>(count) * kChannels * grid_.cells(), kVector,
+              uint16_t{0});
   size_t cell = 0;
   for (int row = 0; row < grid.rows; ++row)
     for (int col = 0; col < grid.cols; ++col, ++cell)
@@ -170,10 +174,10 @@ size_t PatchFrames::sums_size() const {
 void PatchFrames::density(int count, Pool* pool, float* density) {
   const size_t cells = grid_.cells(), cols = static_cast<size_t>(grid_.cols);
   const auto of = [&](int t) { return density + static_cast<size_t>(t) * cells; };
-  std::fill_n(density, cells * static_cast<size_t>(count), 0.0f);
   for_bands(*pool, grid_.rows, bands_, [&](int first_row, int row_count, size_t worker) {
     const auto first = static_cast<size_t>(first_row), end = first + static_cast<size_t>(row_count);
     uint16_t* sums = sums_.data() + worker * sums_size();
+    for (int t = 0; t < count; ++t) std::fill_n(of(t) + first * cols, (end - first) * cols, 0.0f);
     for (int block = 0; block < count; block += kBlock) {
       const int last = std::min(count, block + kBlock);
       for (int s = 0; s < last; ++s)
@@ -207,18 +211,20 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
   const int known = std::max(count, *std::max_element(reference, reference + grid.cells()) + 1);
   const auto all = static_cast<size_t>(count), stride = round_up(static_cast<size_t>(known));
   // Of each cell and channel all frames side by side.
-  std::vector<uint16_t> steps(grid.cells() * kChannels * stride), sums(stride * pool->threads());
+  const auto steps = std::make_unique_for_overwrite<uint16_t[]>(grid.cells() * kChannels * stride);
+  std::vector<uint16_t> sums(stride * pool->threads());
   // Some cells of all frames at a time: their frames are too far apart for the caches to keep the
   // others.
   constexpr size_t kTogether = 16;
   pool->run((grid.cells() + kTogether - 1) / kTogether, [&](size_t part) {
     const size_t first = part * kTogether, size = std::min(kTogether, grid.cells() - first);
     for (size_t c = 0; c < kChannels; ++c)
-      for (int t = 0; t < known; ++t) {
-        uint16_t of_frame[kTogether];
-        HWY_DYNAMIC_DISPATCH(to_steps)
+      for (int t = 0; t < static_cast<int>(stride); ++t) {
+        // Those that only fill vectors are black.
+        uint16_t of_frame[kTogether] = {};
+        if (t < known) HWY_DYNAMIC_DISPATCH(to_steps)
         (frames.plane(t, static_cast<int>(c)) + first, size, of_frame);
-        uint16_t* to = steps.data() + (first * kChannels + c) * stride + static_cast<size_t>(t);
+        uint16_t* to = steps.get() + (first * kChannels + c) * stride + static_cast<size_t>(t);
         for (size_t i = 0; i < size; ++i) to[i * kChannels * stride] = of_frame[i];
       }
   });
@@ -228,7 +234,7 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
     for (size_t col = 0; col < cols; ++col) {
       const size_t cell = row * cols + col;
       HWY_DYNAMIC_DISPATCH(add_patch)
-      (steps.data(), cols, stride, row - std::min(row, kReach), std::min(rows - 1, row + kReach),
+      (steps.get(), cols, stride, row - std::min(row, kReach), std::min(rows - 1, row + kReach),
        col - std::min(col, kReach), std::min(cols - 1, col + kReach),
        static_cast<size_t>(reference[cell]), sum);
       std::copy_n(sum, all, distance + cell * all);

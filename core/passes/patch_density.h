@@ -1,6 +1,7 @@
 // How alike the patches around a cell are in different frames.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/parallel/pool.h"
@@ -53,7 +54,7 @@ class PatchFrames {
 
  private:
   const uint16_t* steps(int frame) const {
-    return steps_.data() + static_cast<size_t>(frame) * kChannels * grid_.cells();
+    return steps_.get() + static_cast<size_t>(frame) * kChannels * grid_.cells();
   }
   size_t sums_size() const;
 
@@ -61,7 +62,8 @@ class PatchFrames {
   int bands_;
   // Readable up to whole vectors behind the last cell. limit_: of each cell, the patch's steps at
   // which nothing is alike.
-  std::vector<uint16_t> steps_, limit_;
+  std::unique_ptr<uint16_t[]> steps_;
+  std::vector<uint16_t> limit_;
   std::vector<uint16_t> sums_;  // for each thread
 };
 

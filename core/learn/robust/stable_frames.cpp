@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <span>
 
 #include "core/learn/robust/contour.h"
 #include "core/passes/patch_density.h"
@@ -46,7 +48,7 @@ class GridPicture {
 // weaker contour there is the background. Something that stood still for most of the window ends at
 // a contour that the true background does not have.
 void compare_contours(const Grid& grid, const GridPictures& frames, int count,
-                      const std::vector<float>& density, std::vector<int>* from) {
+                      std::span<const float> density, std::vector<int>* from) {
   if (std::min(grid.rows, grid.cols) < 4 || count < 3) return;
   const size_t cells = grid.cells();
   GridPicture background(frames, *from);
@@ -88,9 +90,9 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
 // too little of it is seen in any new frame.
 bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recollection& earlier,
-                      Pool* pool, std::vector<float>* density) {
+                      Pool* pool, std::span<float> density) {
   std::vector<float> rooms(cells * pool->threads());
-  float* of_earlier = density->data() + static_cast<size_t>(count) * cells;
+  float* of_earlier = density.data() + static_cast<size_t>(count) * cells;
   std::fill_n(of_earlier, cells, 0.0f);
   // what(t, alike, first, end) for frames first_frame .. end_frame - 1 at the cells of each part.
   const auto compare = [&](int first_frame, int end_frame, const auto& what) {
@@ -112,7 +114,7 @@ bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recol
   if (static_cast<float>(seen) < kLeastSeen * static_cast<float>(cells)) return false;
   compare(0, earlier.older_frames, add);
   compare(0, count, [&](int t, const float* alike, size_t first, size_t end) {
-    float* of_frame = density->data() + static_cast<size_t>(t) * cells;
+    float* of_frame = density.data() + static_cast<size_t>(t) * cells;
     for (size_t cell = first; cell < end; ++cell)
       of_frame[cell] += earlier.weight[cell] * alike[cell];
   });
@@ -121,7 +123,7 @@ bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recol
 }
 
 // Of each cell the look with the largest density, the first one of equals.
-std::vector<int> densest(const std::vector<float>& density, size_t cells, Pool* pool) {
+std::vector<int> densest(std::span<const float> density, size_t cells, Pool* pool) {
   // Cells at a time: theirs stay in registers and in the first cache.
   constexpr size_t kTogether = 256;
   std::vector<int> from(cells, 0);
@@ -166,15 +168,18 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
                                 const Recollection* earlier, Pool* pool,
                                 const FirstLooks& first_looks) {
   const size_t cells = grid.cells();
-  std::vector<float> density(cells * static_cast<size_t>(count + (earlier ? 1 : 0)));
+  const size_t most = cells * static_cast<size_t>(count + (earlier ? 1 : 0));
+  // Threads touch what is theirs.
+  auto densities = std::make_unique_for_overwrite<float[]>(most);
+  std::span<float> density(densities.get(), most);
   StableFrames result;
   {
     PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
     patches.density(count, pool, density.data());
-    if (earlier && !add_recollection(cells, &patches, count, *earlier, pool, &density)) {
+    if (earlier && !add_recollection(cells, &patches, count, *earlier, pool, density)) {
       result.another_scene = true;
       earlier = nullptr;
-      density.resize(cells * static_cast<size_t>(count));
+      density = density.first(cells * static_cast<size_t>(count));
     }
   }
   const int looks = count + (earlier ? 1 : 0);
@@ -189,9 +194,10 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
   std::vector<int> from = densest(density, cells, pool);
   compare_contours(grid, frames, count, density, &from);
 
-  std::vector<float>().swap(density);
-  std::vector<uint16_t> distance(cells * static_cast<size_t>(looks));
-  patch_distance(grid, frames, looks, from.data(), pool, distance.data());
+  densities.reset();
+  const auto distance =
+      std::make_unique_for_overwrite<uint16_t[]>(cells * static_cast<size_t>(looks));
+  patch_distance(grid, frames, looks, from.data(), pool, distance.get());
   result.of_cell = FrameLists(cells, looks);
   result.limit.resize(cells);
   const auto all = static_cast<size_t>(count), cols = static_cast<size_t>(grid.cols);
