@@ -102,7 +102,7 @@ void sum_rows(const Grid& grid, const Samples& samples, int top, int bottom, int
 void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& samples,
                    float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
-  alignas(64) uint32_t sums[kColumns];
+  alignas(64) uint32_t sums[kColumns + 1];
   // Of the samples before each; and of pixels left of a cell's left edge.
   uint64_t running[kColumns + 1];
   running[0] = 0;
@@ -129,12 +129,18 @@ void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& 
       const int count = std::min(kColumns, all - first);
       sum_rows(grid, samples, top, bottom, first, count, sums);
       for (int s = 0; s < count; ++s) running[s + 1] = running[s] + sums[s];
-      for (; next <= cols; ++next) {
+      // Of an edge that parts no pixels, this is not a part of the sum.
+      sums[count] = 0;
+      // The edges that lie in these columns.
+      size_t last = cols;
+      if (count < all)
+        while (last >= next && edges[last].samples + (edges[last].pixels > 0) > first + count)
+          --last;
+      for (; next <= last; ++next) {
         const auto [end, part] = edges[next];
-        if (end + (part > 0) > first + count) break;
-        uint64_t pixels = static_cast<uint64_t>(shared) * (sum + running[end - first]);
-        if (part > 0) pixels += static_cast<uint64_t>(part) * sums[end - first];
-        before[next] = static_cast<double>(pixels);
+        const uint64_t pixels = static_cast<uint64_t>(shared) * (sum + running[end - first]) +
+                                static_cast<uint64_t>(part) * sums[end - first];
+        before[next] = static_cast<double>(static_cast<int64_t>(pixels));
       }
       sum += running[count];
     }

@@ -34,16 +34,18 @@ void StandingLooks::follow(const float* const frame[3], const Gain& gain, int64_
   float* const next[3] = {looks_.plane(kNext, 0), looks_.plane(kNext, 1), looks_.plane(kNext, 2)};
   for (size_t at = 0; at < cells_.size(); ++at) {
     Cell& cell = cells_[at];
-    float level[3], from_look = 0, from_next = 0;
+    float level[3], from_look = 0;
     for (size_t c = 0; c < kChannels; ++c) {
       level[c] = frame[c][at] * inverse[c];
       from_look += std::abs(level[c] - look[c][at]);
-      from_next += std::abs(level[c] - next[c][at]);
     }
     const auto add = [&](float* const levels[3], Look* to, float least_share) {
       ++to->frames;
       to->last = number;
-      const float share = std::max(least_share, 1 / static_cast<float>(to->frames));
+      // No division where it is known which one is more.
+      const float share = static_cast<float>(to->frames) * least_share >= 2
+                              ? least_share
+                              : std::max(least_share, 1 / static_cast<float>(to->frames));
       for (size_t c = 0; c < kChannels; ++c) levels[c][at] += share * (level[c] - levels[c][at]);
     };
     if (cell.look.frames > 0 && from_look < kSame) {
@@ -51,6 +53,8 @@ void StandingLooks::follow(const float* const frame[3], const Gain& gain, int64_
       cell.next = {};
       continue;
     }
+    float from_next = 0;
+    for (size_t c = 0; c < kChannels; ++c) from_next += std::abs(level[c] - next[c][at]);
     if (cell.next.frames == 0 || from_next >= kSame) cell.next = {number, number, 0};
     add(next, &cell.next, 0);
     if (cell.next.frames == kSteady) take_next(at);
@@ -81,7 +85,7 @@ const std::vector<int>& StandingLooks::uncovered(const float* const background[3
                                 looks_.plane(kLook, 2)};
   size_t count = 0;
   for (size_t cell = 0; cell < grid_.cells(); ++cell) {
-    differs_[cell] = shows(cell) && differs_at(look, background, cell);
+    differs_[cell] = differs_at(look, background, cell) && shows(cell);
     count += differs_[cell];
     news_ += differs_[cell] && number_ - cells_[cell].look.since < kNewsFrames;
   }
@@ -101,11 +105,16 @@ const std::vector<int>& StandingLooks::stood(const float* const background[3], i
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
   const auto ripe = [&](size_t cell) { return number_ - cells_[cell].look.since >= frames; };
-  bool any = false;
+  // Few cells differ: what else is known of a cell is looked at there only.
   for (size_t cell = 0; cell < grid_.cells(); ++cell) {
     float sum = 0;
     for (int c = 0; c < kChannels; ++c) sum += std::abs(look[c][cell] - background[c][cell]);
-    differs_[cell] = sum >= kSame && shows(cell);
+    differs_[cell] = sum >= kSame;
+  }
+  bool any = false;
+  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
+    if (!differs_[cell]) continue;
+    differs_[cell] = shows(cell);
     any |= differs_[cell] && ripe(cell);
   }
   if (!any) return found_;
