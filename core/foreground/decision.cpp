@@ -6,10 +6,10 @@
 #include <span>
 #include <utility>
 
+#include "core/foreground/full_depth.h"
 #include "core/foreground/mask_runs.h"
 #include "core/foreground/vote.h"
 #include "core/passes/bands.h"
-#include "core/passes/digits.h"
 #include "core/passes/distance.h"
 #include "core/passes/mean_distance.h"
 #include "core/passes/residual.h"
@@ -25,11 +25,6 @@ constexpr size_t kPixelsPerPart = 16384;
 constexpr int kMostNear = 16;
 // Pixels that are looked at together, at most: whole blocks.
 constexpr int kLongestRun = 8 * kMaskBlock;
-
-// The highest 8 bits of two pixels are less than a level a channel from what they are.
-constexpr double kCut = 1.7320508;
-// Pixels that are compared as a whole together: they are few, and stay in registers.
-constexpr size_t kWhole = 64;
 
 int in_256ths(double value) { return static_cast<int>(std::lround(256 * value)); }
 
@@ -203,7 +198,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
   now_.whole = frame.low[0] && !now_.means;
-  now_.below = now_.whole && frame.fixed && now_.threshold < kCut;
+  now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
   // Fewer parts than rows, so that each has some.
   const Grid& grid = texture_.grid();
@@ -324,7 +319,7 @@ void Decision::compare(int first_row, int row_count) {
       const uint8_t* const x[3] = {now_.frame.x[0] + first, now_.frame.x[1] + first,
                                    now_.frame.x[2] + first};
       if (now_.whole)
-        compare_whole(x, level, first, count, differing_row(y) + left);
+        full_depth_mask(now_.frame, level, now_.threshold, first, count, differing_row(y) + left);
       else if (!now_.means)
         foreground_mask(x, level, count, now_.threshold, nullptr, differing_row(y) + left);
     }
@@ -333,36 +328,6 @@ void Decision::compare(int first_row, int row_count) {
       now_.frame.ignored->clear(band_.first() + y, 0, shape_.width, differing_row(y));
     repeat_border(differing_row(y));
   }
-}
-
-// The same of whole samples: only where their highest bits do not say that they are near.
-void Decision::compare_whole(const uint8_t* const x[3], const uint8_t* const level[3], size_t first,
-                             size_t count, uint8_t* differing) const {
-  if (now_.threshold < kCut)
-    std::memset(differing, 255, count);
-  else
-    foreground_mask(x, level, count, now_.threshold - kCut, nullptr, differing);
-  const double unit = 1 << now_.frame.model->low_bits(), in_units = now_.threshold * unit;
-  const auto most = static_cast<uint64_t>(std::min(in_units * in_units, 1e15));
-  for (size_t p = 0; p < count; p += kWhole) {
-    const size_t size = std::min(kWhole, count - p);
-    if (!std::memchr(differing + p, 255, size)) continue;
-    uint64_t units[kWhole];
-    whole_distance(first + p, size, units);
-    for (size_t i = 0; i < size; ++i) differing[p + i] = units[i] > most ? 255 : 0;
-  }
-}
-
-// Squared, of at most kWhole pixels.
-void Decision::whole_distance(size_t first, size_t count, uint64_t* units) const {
-  const Comparison& frame = now_.frame;
-  uint16_t level[kChannels][kWhole];
-  uint16_t* const made[3] = {level[0], level[1], level[2]};
-  frame.model->evaluate_deep(first, count, made);
-  const uint8_t* const high[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
-  const uint8_t* const low[3] = {frame.low[0] + first, frame.low[1] + first, frame.low[2] + first};
-  const uint16_t* const l[3] = {level[0], level[1], level[2]};
-  squared_units(high, low, frame.model->low_bits(), l, count, units);
 }
 
 // Which means differ.
@@ -442,7 +407,9 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     if (now_.frame.limits) fetch(now_.frame.limits + shape_.first(y + 1) + left, run.count);
   }
   look_at(&run);
-  if (now_.whole) look_at_whole(&run);
+  if (now_.whole)
+    full_depth_distance(now_.frame, shape_.first(y) + static_cast<size_t>(left),
+                        static_cast<size_t>(run.count), run.own);
   if (sampled || moving) look_around(&run);
   uint16_t moved[kLongestRun];
   if (sampled) {
@@ -512,21 +479,6 @@ void Decision::look_at(Run* run) {
   if (now_.means)
     for (size_t p = 0; p < count; ++p) run->limit[p] /= 3;
   for (size_t p = 0; p < count; ++p) run->limit[p] = std::max(run->limit[p], least);
-}
-
-// Distances of whole samples, rounded up: they exceed a whole number where these do.
-void Decision::look_at_whole(Run* run) const {
-  const int shift = 2 * now_.frame.model->low_bits();
-  const uint64_t below = (uint64_t{1} << shift) - 1;
-  const size_t first = shape_.first(run->y) + static_cast<size_t>(run->left);
-  for (size_t p = 0; p < static_cast<size_t>(run->count); p += kWhole) {
-    const size_t size = std::min(kWhole, static_cast<size_t>(run->count) - p);
-    uint64_t units[kWhole];
-    whole_distance(first + p, size, units);
-    for (size_t i = 0; i < size; ++i)
-      run->own[p + i] =
-          static_cast<uint16_t>(std::min<uint64_t>((units[i] + below) >> shift, 65535));
-  }
 }
 
 // Distances from the nearest pixels around.

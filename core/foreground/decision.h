@@ -143,14 +143,10 @@ class Decision {
   void look(int parts);
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
-  void compare_whole(const uint8_t* const x[3], const uint8_t* const level[3], size_t first,
-                     size_t count, uint8_t* differing) const;
-  void whole_distance(size_t first, size_t count, uint64_t* units) const;
   void compare_means(int first_row, int row_count);
   void explain(int grid_row);
   void explain_run(int y, int left, int right, int grid_row);
   void look_at(Run* run);
-  void look_at_whole(Run* run) const;
   void look_around(Run* run);
   void leave_shadows(const Run& run);
   void learn(int first_row, int row_count);
