@@ -41,7 +41,8 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
   constexpr double kAtOnce = 1.0 / 3;
   // Other machines, and other work on this one.
   constexpr double kMargin = 4;
-  const double frames = learner.solve_seconds(options.window_size, Models::two) * options.frame_rate;
+  const double frames =
+      learner.solve_seconds(options.window_size, Models::two) * options.frame_rate;
   if (!(frames > kAtOnce)) return 0;
   return static_cast<int>(
       std::min<double>(std::ceil(kMargin * frames), (options.window_size + 3) / 4));
