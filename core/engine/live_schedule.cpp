@@ -1,6 +1,7 @@
 #include "core/engine/live_schedule.h"
 
 #include <algorithm>
+#include <chrono>
 
 namespace qdmd {
 namespace {

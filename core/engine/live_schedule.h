@@ -1,7 +1,6 @@
 // Each frame leaves at once, against the newest model.
 #pragma once
 
-#include <chrono>
 #include <optional>
 
 #include "core/engine/live_plan.h"
@@ -42,7 +41,7 @@ class LiveSchedule : public Schedule {
 
   // A solve in one piece: it goes on beside the frames until frame `due`, before which it must end.
   // If only that frame waited, it could wait long. So each frame helps until its share of the work
-  // that the last solve was is done.
+  // is done, which is taken to be as much as the last solve was.
   struct Piece {
     int64_t from, due;
     double estimate;  // Learner::solve_seconds()

@@ -113,8 +113,7 @@ class Decision {
     Comparison frame = {};
     Pool* pool = nullptr;
     bool means = false, textures = false;
-    bool whole = false;  // samples have more than 8 bits, and the user's threshold or own distances
-                         // are compared with all of them
+    bool whole = false;  // own distances are of all bits, more than 8 (full_depth.h)
     bool below = false;  // pixels may differ that are the same in 8 bits
     double threshold = 0;
     bool level_known = false;  // L is still that of the frame before
