@@ -120,16 +120,17 @@ void Background::rehearse(const MaskWishes& wishes) {
   const bool fixed = wishes.threshold > 0;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
-  std::vector<uint8_t> room(room_for_planes(snapshots_->shape()));
+  const SnapshotRange whole = room_.frames->whole(*snapshots_);
+  const bool deep = whole.low_bits() > 0;
+  const size_t spread = room_for_planes(snapshots_->shape());
+  std::vector<uint8_t> room((deep ? 2 : 1) * spread);
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
     Comparison frame = {
         {},    &model,          foreground.threshold, fixed ? nullptr : model.limits(),
         fixed, &wishes.ignored, wishes.shadows};
     read_planes(snapshots_->picture(t), room.data(), frame.x);
-    const SnapshotRange whole = room_.frames->whole(*snapshots_);
-    for (int c = 0; c < kChannels && whole.low_bits() > 0; ++c)
-      frame.low[c] = whole.low_plane(t, c);
+    if (deep) read_planes(whole.low_picture(t), room.data() + spread, frame.low);
     decision_.decide(frame, room_.pool);
   }
 }

@@ -47,8 +47,8 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   frames_ =
       FrameStore(layout_.capacity, width, band, learner->contents(), options.max_memory - beside);
   // Its pages are touched once somebody wants more than the background.
-  next_chroma_ =
-      std::make_unique_for_overwrite<uint8_t[]>(room_for_planes(frames_.window().shape()));
+  next_chroma_ = std::make_unique_for_overwrite<uint8_t[]>(
+      (options.low_bits() > 0 ? 2 : 1) * room_for_planes(frames_.window().shape()));
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -208,11 +208,10 @@ OutputTask Engine::next_task(Output output) {
   const int index = frames_.size() - queue_.pending, slot = frames_.slot(index);
   schedule_->show(index);
   OutputTask task = task_of(output);
-  if (output != Output::background) read_next(slot, task.x);
+  if (output != Output::background) read_next(slot, &task);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
   if (frames_.low_bits() > 0) {
-    for (int c = 0; c < kChannels; ++c) task.low[c] = frames_.low(slot, c);
     task.alpha_low = frames_.alpha_low(slot);
     task.constant_alpha_low = frames_.constant_alpha_low(slot);
   }
@@ -220,10 +219,16 @@ OutputTask Engine::next_task(Output output) {
 }
 
 // Where pixels share samples, once a frame.
-void Engine::read_next(int slot, const uint8_t* planes[kChannels]) {
-  if (!read_) read_planes(frames_.window().picture(slot), next_chroma_.get(), next_);
+void Engine::read_next(int slot, OutputTask* task) {
+  const bool deep = frames_.low_bits() > 0;
+  if (!read_) {
+    read_planes(frames_.window().picture(slot), next_chroma_.get(), next_);
+    uint8_t* const room = next_chroma_.get() + room_for_planes(frames_.window().shape());
+    if (deep) read_planes(frames_.low_picture(slot), room, next_low_);
+  }
   read_ = true;
-  std::copy_n(next_, kChannels, planes);
+  std::copy_n(next_, kChannels, task->x);
+  if (deep) std::copy_n(next_low_, kChannels, task->low);
 }
 
 // Once a frame.

@@ -62,10 +62,12 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   const FrameContents contents = learner.contents();
   const ChromaShape shape = {width, height, contents.chroma_columns, contents.chroma_rows};
-  layout.frame_bytes = (options.depth > 8 ? 2 : 1) * PlaneSlots::bytes(layout.capacity, shape);
+  const uint64_t digits = options.low_bits() > 0 ? 2 : 1;
+  layout.frame_bytes = digits * PlaneSlots::bytes(layout.capacity, shape);
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, contents);
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
-  const uint64_t masks = Decision::bytes(width, band) + layout.soft_bytes + room_for_planes(shape);
+  const uint64_t masks =
+      Decision::bytes(width, band) + layout.soft_bytes + digits * room_for_planes(shape);
   const uint64_t camera = options.stabilize == Stabilize::off
                               ? 0
                               : Stabilizer::bytes(width, height) + Restorer::bytes(width, height);

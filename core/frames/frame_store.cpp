@@ -55,7 +55,8 @@ FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameCon
       varies_(static_cast<size_t>(capacity), 0),
       poses_(static_cast<size_t>(capacity)) {
   if (low_bits_ > 0) {
-    low_ = PlaneSlots(capacity, pixels_of(width, height_));
+    low_ = planes_.shape().is_shared() ? PlaneSlots(capacity, planes_.shape())
+                                       : PlaneSlots(capacity, pixels_of(width, height_));
     if (sample_step_ > 1)
       low_samples_ = PlaneSlots(capacity, samples_of(band, width, sample_step_));
     constant_alpha_low_.resize(static_cast<size_t>(capacity), 255);
@@ -82,9 +83,7 @@ uint64_t FrameStore::bytes(int capacity, int width, const Band& band,
     beside += GridFrames::bytes(Grid(width, band.height(), contents.cells_along), capacity);
   if (deep) {
     beside += static_cast<uint64_t>(capacity);
-    if (__builtin_add_overflow(bytes, PlaneSlots::bytes(capacity, pixels_of(width, height)),
-                               &bytes))
-      return std::numeric_limits<uint64_t>::max();
+    if (__builtin_add_overflow(bytes, bytes, &bytes)) return std::numeric_limits<uint64_t>::max();
   }
   if (__builtin_add_overflow(bytes, beside, &bytes)) return std::numeric_limits<uint64_t>::max();
   return bytes;
@@ -121,30 +120,29 @@ bool FrameStore::append(const ImageView& frame) {
 void FrameStore::take_contents(int slot) {
   const KeptPicture picture = planes_.picture(slot);
   if (sample_step_ > 1) {
-    samples_.pad(slot);
-    const int top = band_.first_sample(sample_step_) - band_.first(),
-              end = band_.own_end() - band_.first();
-    RowReader reader(picture, width_, spread_.data());
-    const size_t along = sample_count(width_, sample_step_);
-    uint8_t* to[] = {samples_.plane(slot, 0), samples_.plane(slot, 1), samples_.plane(slot, 2)};
-    for (int y = top; y < end; y += sample_step_) {
-      const uint8_t* rows[kChannels];
-      reader.read(y, rows);
-      for (int c = 0; c < kChannels; to[c++] += along)
-        take_samples(rows[c], width_, 1, sample_step_, to[c]);
-    }
-    if (low_bits_ > 0) {
-      low_samples_.pad(slot);
-      for (int c = 0; c < kChannels; ++c)
-        take_samples(low_.plane(slot, c) + ptrdiff_t{top} * width_, width_, end - top, sample_step_,
-                     low_samples_.plane(slot, c));
-    }
+    take_every_step(picture, slot, &samples_);
+    if (low_bits_ > 0) take_every_step(low_.picture(slot), slot, &low_samples_);
   }
   if (cells_.cells() == 0) return;
   find_own_cells(grid_, band_, picture, &cells_, slot);
   if (band_.is_whole()) return;
   to_share_[static_cast<size_t>(slot)] = 1;
   any_to_share_ = true;
+}
+
+void FrameStore::take_every_step(const KeptPicture& picture, int slot, PlaneSlots* samples) {
+  samples->pad(slot);
+  const int top = band_.first_sample(sample_step_) - band_.first(),
+            end = band_.own_end() - band_.first();
+  RowReader reader(picture, width_, spread_.data());
+  const size_t along = sample_count(width_, sample_step_);
+  uint8_t* to[] = {samples->plane(slot, 0), samples->plane(slot, 1), samples->plane(slot, 2)};
+  for (int y = top; y < end; y += sample_step_) {
+    const uint8_t* rows[kChannels];
+    reader.read(y, rows);
+    for (int c = 0; c < kChannels; to[c++] += along)
+      take_samples(rows[c], width_, 1, sample_step_, to[c]);
+  }
 }
 
 const GridFrames& FrameStore::cells() const {
@@ -157,19 +155,26 @@ const GridFrames& FrameStore::cells() const {
 }
 
 bool FrameStore::unshare(uint64_t beside) {
-  const uint64_t more = beside + PlaneSlots::bytes(capacity(), planes_.pixels());
+  const bool deep = low_bits_ > 0;
+  const uint64_t more = beside + (deep ? 2 : 1) * PlaneSlots::bytes(capacity(), planes_.pixels());
   if (more > most_bytes_ || bytes() > most_bytes_ - more) return false;
   most_bytes_ -= beside;
   Window window = planes_.unshared();
+  PlaneSlots low;
+  if (deep) low = PlaneSlots(capacity(), planes_.pixels());
   std::vector<uint8_t> room(room_for_planes(planes_.shape()));
-  for (int i = 0; i < planes_.size(); ++i) {
+  const auto spread = [&](const KeptPicture& picture, int slot, PlaneSlots* to) {
     const uint8_t* planes[3];
-    read_planes(planes_.picture(slot(i)), room.data(), planes);
-    window.pad(slot(i));
-    for (int c = 0; c < kChannels; ++c)
-      std::copy_n(planes[c], planes_.pixels(), window.plane(slot(i), c));
+    read_planes(picture, room.data(), planes);
+    to->pad(slot);
+    for (int c = 0; c < kChannels; ++c) std::copy_n(planes[c], to->pixels(), to->plane(slot, c));
+  };
+  for (int i = 0; i < planes_.size(); ++i) {
+    spread(planes_.picture(slot(i)), slot(i), &window);
+    if (deep) spread(low_.picture(slot(i)), slot(i), &low);
   }
   planes_ = std::move(window);
+  if (deep) low_ = std::move(low);
   return true;
 }
 
@@ -227,9 +232,10 @@ bool FrameStore::take_planes(int slot, const ImageView& frame, uint8_t alpha) {
   return is_constant_alpha(frame, 0, height_, alpha);
 }
 
-// Each sample for all pixels that share it.
+// Where the planes do not keep shared samples once, each for all pixels that share it.
 void FrameStore::take_deep_planes(int slot, const ImageView& frame) {
   const auto width = static_cast<size_t>(width_);
+  const ChromaShape& shape = planes_.shape();
   for (int c = 0; c < kChannels; ++c) {
     uint8_t *high = planes_.plane(slot, c), *low = low_.plane(slot, c);
     if (c > 0 && frame.channel[c] == frame.channel[0]) {
@@ -240,6 +246,12 @@ void FrameStore::take_deep_planes(int slot, const ImageView& frame) {
     const Spacing at = frame.spacing(c);
     const size_t samples =
         (width + static_cast<size_t>(at.columns) - 1) / static_cast<size_t>(at.columns);
+    if (c > 0 && shape.is_shared()) {
+      for (int y = 0; y < shape.chroma_height(); ++y, high += samples, low += samples)
+        split_digits(frame.channel[c] + y * at.row_stride, at.pixel_stride, frame.bits, samples,
+                     high, low);
+      continue;
+    }
     for (int y = 0; y < height_; ++y, high += width, low += width) {
       const uint8_t* const from = frame.channel[c] + y / at.rows * at.row_stride;
       if (y % at.rows != 0) {

@@ -21,9 +21,9 @@ struct FrameContents {
   // Pixels that share a sample of channels 1 and 2 in all frames (ChromaShape): such samples are
   // kept once. 1: whatever frames share, each pixel has its own.
   int chroma_columns = 1, chroma_rows = 1;
-  // Bits of a sample below its highest eight, 0 to 8. With some, frames come with so many, and each
-  // pixel has its own samples: planes, samples and cells are of the highest eight bits, and the
-  // bits below are kept beside planes and samples.
+  // Bits of a sample below its highest eight, 0 to 8. With some, frames come with so many: planes,
+  // samples and cells are of the highest eight bits, and the bits below are kept beside planes and
+  // samples, once where pixels share them.
   int low_bits = 0;
 };
 
@@ -82,6 +82,7 @@ class FrameStore {
   }
   // What is below the planes, where low_bits() is not 0.
   const uint8_t* low(int slot, int channel) const { return low_.plane(slot, channel); }
+  KeptPicture low_picture(int slot) const { return low_.picture(slot); }
 
   // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.
   const PlaneSlots& samples() const { return sample_step_ > 1 ? samples_ : planes_; }
@@ -115,6 +116,7 @@ class FrameStore {
   bool keep_alpha(int slot, const ImageView& frame);
   bool take_planes(int slot, const ImageView& frame, uint8_t alpha);
   void take_contents(int slot);
+  void take_every_step(const KeptPicture& picture, int slot, PlaneSlots* samples);
   void take_deep_planes(int slot, const ImageView& frame);
   bool take_deep_alpha(int slot, const ImageView& frame);
   bool make_alpha();

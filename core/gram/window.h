@@ -172,11 +172,12 @@ class SnapshotRange {
   }
   // 0: samples have 8 bits.
   int low_bits() const { return low_ ? low_bits_ : 0; }
-  // Where low_bits() is not 0.
+  // Where low_bits() is not 0. Pixels share low digits where they share samples.
   const uint8_t* low_plane(int index, int channel) const {
     return low_->plane(slot(index), channel);
   }
-  // In units of its lowest bit.
+  KeptPicture low_picture(int index) const { return low_->picture(slot(index)); }
+  // In units of its lowest bit. Where each pixel has its own samples.
   double sample(int index, int channel, size_t pixel) const {
     const int high = plane(index, channel)[pixel];
     return low_ ? (high << low_bits_) + low_plane(index, channel)[pixel] : high;

@@ -40,7 +40,7 @@ GramLearner::GramLearner(const LearnOptions& options, int width, const Band& ban
 
 // Solvers that read pixels want each to have its own samples.
 bool GramLearner::keeps_shared() const {
-  return options_.keeps_shared() && band_.is_whole() &&
+  return options_.keeps_shared() && options_.depth == 8 && band_.is_whole() &&
          (options_.method == Method::dmd ||
           (options_.dmd.solver != Solver::qr && options_.dmd.solver != Solver::adjoint));
 }

@@ -29,7 +29,7 @@ struct LearnOptions {
   static constexpr int kMostDepth = 16;
   int low_bits() const { return depth - 8; }
   // Such samples are kept once.
-  bool keeps_shared() const { return depth == 8 && chroma_columns > 1; }
+  bool keeps_shared() const { return chroma_columns > 1; }
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;
 };
 

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/passes/bands.h"
+#include "core/passes/digits.h"
 #include "core/passes/read_samples.h"
 
 namespace qdmd {
@@ -15,40 +16,62 @@ constexpr size_t kRun = 1024;
 // Pixels whose share of a pass is worth waking a thread for.
 constexpr size_t kPixelsPerPart = 16384;
 
-}  // namespace
-
-uint64_t build_spread_bytes(int snapshots, int threads) {
-  return static_cast<uint64_t>(threads) * static_cast<uint64_t>(snapshots) *
-         ((kChannels - 1) * kRun + kChannels * sizeof(uint8_t*));
-}
-
-void build_spread(const SnapshotRange& snapshots, size_t first, size_t count, Pool* pool,
-                  BackgroundModel* model) {
+// `read(t, channel, first, count, room)` says where samples of snapshot t are: in `room`, which has
+// space for kRun of them, or elsewhere.
+template <typename Sample, typename Read>
+void build_runs(int snapshots, size_t first, size_t count, const Read& read, Pool* pool,
+                BackgroundModel* model) {
   constexpr size_t kUnit = BackgroundModel::kSliceUnit;
-  const auto frames = static_cast<size_t>(snapshots.size());
-  const size_t planes_of_chroma = (kChannels - 1) * frames;
+  const size_t planes_of_run = kChannels * static_cast<size_t>(snapshots);
   // Taken here: tasks of the pool take no memory.
   const auto room =
-      std::make_unique_for_overwrite<uint8_t[]>(planes_of_chroma * kRun * pool->threads());
+      std::make_unique_for_overwrite<Sample[]>(planes_of_run * kRun * pool->threads());
   const auto planes =
-      std::make_unique_for_overwrite<const uint8_t*[]>(kChannels * frames * pool->threads());
+      std::make_unique_for_overwrite<const Sample*[]>(planes_of_run * pool->threads());
   const auto parts = static_cast<int>(std::max<size_t>(1, count / kPixelsPerPart));
   pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
     const Slice slice = {static_cast<int>(part), parts};
     const size_t begin = first + slice.first(count, kUnit), end = begin + slice.size(count, kUnit);
-    const uint8_t** const of_run = planes.get() + worker * kChannels * frames;
+    const Sample** const of_run = planes.get() + worker * planes_of_run;
     for (size_t p = begin; p < end; p += kRun) {
       const size_t length = std::min(kRun, end - p);
-      uint8_t* to = room.get() + worker * planes_of_chroma * kRun;
-      for (size_t t = 0; t < frames; ++t)
-        for (int c = 0; c < kChannels; ++c) {
-          of_run[kChannels * t + static_cast<size_t>(c)] =
-              read_samples(snapshots, static_cast<int>(t), c, p, length, to);
-          if (c > 0) to += kRun;
-        }
+      Sample* to = room.get() + worker * planes_of_run * kRun;
+      for (int t = 0; t < snapshots; ++t)
+        for (int c = 0; c < kChannels; ++c, to += kRun)
+          of_run[kChannels * t + c] = read(t, c, p, length, to);
       model->build_from(of_run, p, length);
     }
   });
+}
+
+}  // namespace
+
+uint64_t build_spread_bytes(int snapshots, int threads) {
+  return static_cast<uint64_t>(threads) * static_cast<uint64_t>(snapshots) * kChannels *
+         (kRun + sizeof(uint8_t*));
+}
+
+void build_spread(const SnapshotRange& snapshots, size_t first, size_t count, Pool* pool,
+                  BackgroundModel* model) {
+  if (snapshots.low_bits() == 0) {
+    build_runs<uint8_t>(
+        snapshots.size(), first, count,
+        [&](int t, int c, size_t p, size_t length, uint8_t* room) {
+          return read_samples(snapshots, t, c, p, length, room);
+        },
+        pool, model);
+    return;
+  }
+  build_runs<uint16_t>(
+      snapshots.size(), first, count,
+      [&](int t, int c, size_t p, size_t length, uint16_t* room) {
+        uint8_t high[kRun], low[kRun];
+        join_digits(read_samples(snapshots, t, c, p, length, high),
+                    read_low_samples(snapshots, t, c, p, length, low), snapshots.low_bits(), length,
+                    room);
+        return room;
+      },
+      pool, model);
 }
 
 }  // namespace qdmd

@@ -254,7 +254,7 @@ uint64_t WindowMask::bytes(int capacity, size_t pixels) {
 uint64_t Filler::bytes(int snapshots, bool deep) {
   const auto m = static_cast<uint64_t>(std::max(snapshots, 1));
   const uint64_t run = run_of(snapshots, deep), size = deep ? 2 : 1;
-  return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + 1) * run +
+  return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + size) * run +
          m * kChannels * sizeof(uint8_t*);
 }
 
@@ -262,7 +262,7 @@ Filler::Filler(int snapshots, bool deep) : run_(run_of(snapshots, deep)) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
   keep_.resize(m * run_);
   masked_.resize(run_);
-  spread_.resize(run_);
+  spread_.resize((deep ? 2 : 1) * run_);
   // One row more for the level.
   if (deep)
     list_rows(m * kChannels, &deep_samples_, &deep_planes_);
@@ -330,10 +330,17 @@ const uint16_t* const* Filler::fill_deep(const SnapshotRange& snapshots,
   const int low_bits = snapshots.low_bits();
   take_rows(snapshots, gains, mask, first, padded,
             [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
+              const bool own = channel == 0 || !snapshots.shape().is_shared();
+              const uint8_t* high = snapshots.plane(t, channel) + first;
+              const uint8_t* low = snapshots.low_plane(t, channel) + first;
+              if (!own) {
+                high = read_samples(snapshots, t, channel, first, count, spread_.data());
+                low = read_low_samples(snapshots, t, channel, first, count, spread_.data() + run_);
+              }
               HWY_DYNAMIC_DISPATCH(take_deep_row)
-              (snapshots.plane(t, channel) + first, snapshots.low_plane(t, channel) + first, keep,
-               low_bits, padded, factor, snapshots.plane(next, channel) + first,
-               snapshots.low_plane(next, channel) + first, deep_samples_.data() + row);
+              (high, low, keep, low_bits, padded, factor,
+               own ? snapshots.plane(next, channel) + first : high,
+               own ? snapshots.low_plane(next, channel) + first : low, deep_samples_.data() + row);
             });
   uint16_t* level = deep_samples_.data() + m * kChannels * run_;
   for (size_t c = 0; c < kChannels; ++c) {

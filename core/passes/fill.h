@@ -67,7 +67,7 @@ class Filler {
   std::vector<const uint8_t*> planes_;
   std::vector<const uint16_t*> deep_planes_;
   std::vector<uint16_t> masked_;  // snapshots, of each pixel
-  std::vector<uint8_t> spread_;   // a row of samples that pixels share
+  std::vector<uint8_t> spread_;   // a row of samples that pixels share, or of their two digits
 };
 
 // Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,

@@ -42,6 +42,12 @@ const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int chann
                       room);
 }
 
+const uint8_t* read_low_samples(const SnapshotRange& snapshots, int index, int channel,
+                                size_t first, size_t count, uint8_t* room) {
+  return read_samples(snapshots.shape(), snapshots.low_plane(index, channel), channel, first, count,
+                      room);
+}
+
 void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3]) {
   std::copy_n(picture.plane, kChannels, planes);
   const ChromaShape& shape = picture.shape;

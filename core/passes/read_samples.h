@@ -10,6 +10,10 @@ namespace qdmd {
 const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
                             size_t count, uint8_t* room);
 
+// Of their low digits.
+const uint8_t* read_low_samples(const SnapshotRange& snapshots, int index, int channel,
+                                size_t first, size_t count, uint8_t* room);
+
 // The same of a plane by itself.
 const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int channel,
                             size_t first, size_t count, uint8_t* room);

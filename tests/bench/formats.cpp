@@ -9,6 +9,7 @@
 
 #include "core/foreground/picture.h"
 #include "core/frames/frame_store.h"
+#include "core/passes/read_samples.h"
 #include "tests/bench/clock.h"
 
 namespace {
@@ -51,17 +52,28 @@ bool is_rgb(const Format& format) {
   return name.find("GRAY") != 0 && name.find('R') != std::string::npos;
 }
 
+// What the default keeps of frames.
+FrameContents contents_of(const Format& format) {
+  FrameContents contents = {1, 0, 1, 1, format.bits.low()};
+  const ChannelAt& chroma = format.at[1];
+  if (chroma.columns > 1)
+    contents.chroma_columns = chroma.columns, contents.chroma_rows = chroma.rows;
+  return contents;
+}
+
 // A frame of a format, planes for it, and a background.
 struct Scene {
   int width, height;
-  std::vector<uint8_t> planes[4], x[3], mask;
+  std::vector<uint8_t> planes[4], x[3], mask, chroma[2];
+  const uint8_t *own[3] = {}, *low[3] = {};
   FrameStore store;
   MutableImageView view;
   BackgroundModel model;
   Levels levels;
 
   Scene(const Format& format, int width_, int height_)
-      : width(width_), height(height_), store(1, width_, height_, {1, 0, 1, 1, format.bits.low()}) {
+      : width(width_), height(height_), store(1, width_, height_, contents_of(format)) {
+    for (auto& room : chroma) room.resize(room_for_planes(store.window().shape()));
     const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
     std::array<ptrdiff_t, 4> stride{};
     for (const ChannelAt& at : format.at)
@@ -82,7 +94,7 @@ struct Scene {
     }
     if (even) {
       view.pixel_stride = view.own[0].pixel_stride, view.row_stride = view.own[0].row_stride;
-      for (Spacing& own : view.own) own = {};
+      for (Spacing& spacing : view.own) spacing = {};
     }
     if (!is_rgb(format)) levels = {{16, 128, 128}, {235, 128, 128}};
     for (auto& plane : x) plane.resize(pixels, 100);
@@ -94,6 +106,7 @@ struct Scene {
     model.set_time(0);
   }
 
+  // Takes the frame in, and spreads samples that pixels share, as masks need them.
   void split() {
     ImageView in;
     in.width = width, in.height = height;
@@ -103,12 +116,14 @@ struct Scene {
     in.alpha = view.alpha;
     for (int c = 0; c < 4; ++c) in.own[c] = view.own[c];
     benchmark::DoNotOptimize(store.append(in));
+    const int slot = store.slot(0);
+    read_planes(store.window().picture(slot), chroma[0].data(), own);
+    if (view.bits.is_deep()) read_planes(store.low_picture(slot), chroma[1].data(), low);
+    benchmark::ClobberMemory();
   }
   void write(Output output) {
     OutputTask task = {};
-    const int slot = store.slot(0);
-    for (int c = 0; c < 3; ++c) task.x[c] = x[c].data();
-    for (int c = 0; view.bits.is_deep() && c < 3; ++c) task.low[c] = store.low(slot, c);
+    for (int c = 0; c < 3; ++c) task.x[c] = own[c], task.low[c] = low[c];
     task.model = &model, task.output = output, task.mask = mask.data(), task.constant_alpha = 255;
     write_picture(task, levels, view, 0, height);
   }

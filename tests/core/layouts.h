@@ -47,20 +47,27 @@ inline const VideoLayout kVideoLayouts[] = {
     // Samples that no kernel is made for.
     {"sparse", {{{0, 0, 3}, {1, 0, 5, 2, 2}, {1, 3, 5, 2, 2}, {2, 0, 3}}}}};
 
+// The same of samples that are words, of more than 8 bits.
+inline VideoLayout of_words(VideoLayout layout) {
+  for (ChannelAt& at : layout.at) at.offset *= 2, at.pixel_stride *= 2;
+  return layout;
+}
+
 // A picture in such a layout. Each plane ends with its last sample before an inaccessible page, and
 // the rows of plane k are gap + 2 k bytes longer than they have to be.
 class VideoPicture {
  public:
   static constexpr uint8_t kCanary = 0x5A;
 
-  VideoPicture(const VideoLayout& layout, int width, int height, int gap)
-      : layout_(layout), width_(width), height_(height) {
+  VideoPicture(const VideoLayout& layout, int width, int height, int gap, SampleBits bits = {})
+      : layout_(layout), width_(width), height_(height), bits_(bits) {
+    const int size = bits.is_deep() ? 2 : 1;
     std::array<int, 4> used{}, rows{};
     for (const ChannelAt& at : layout.at) {
       if (at.pixel_stride == 0) continue;
       const auto plane = static_cast<size_t>(at.plane);
       used[plane] =
-          std::max(used[plane], at.offset + (width - 1) / at.columns * at.pixel_stride + 1);
+          std::max(used[plane], at.offset + (width - 1) / at.columns * at.pixel_stride + size);
       rows[plane] = (height - 1) / at.rows + 1;
     }
     for (size_t plane = 0; plane < 4; ++plane) {
@@ -73,13 +80,20 @@ class VideoPicture {
   }
 
   bool has(int c) const { return layout_.at[static_cast<size_t>(c)].pixel_stride != 0; }
+  SampleBits bits() const { return bits_; }
   const ChannelAt& layout_of(int c) const { return layout_.at[static_cast<size_t>(c)]; }
-  // Of channel c; of alpha (3), too.
+  // Of channel c; of alpha (3), too. Of a word its first byte.
   uint8_t& sample(int c, int x, int y) {
     const ChannelAt& at = layout_of(c);
     const auto plane = static_cast<size_t>(at.plane);
     return (*planes_[plane])[static_cast<size_t>(at.offset + y / at.rows * row_stride_[plane] +
                                                  x / at.columns * at.pixel_stride)];
+  }
+  // Of more than 8 bits.
+  void put_word(int c, int x, int y, int value) {
+    uint8_t* const at = &sample(c, x, y);
+    at[0] = static_cast<uint8_t>(value << bits_.shift & 255);
+    at[1] = static_cast<uint8_t>(value << bits_.shift >> 8);
   }
   void fill_randomly(std::mt19937& rng) {
     for (auto& plane : planes_)
@@ -99,6 +113,7 @@ class VideoPicture {
   BasicImageView<Byte> view() {
     BasicImageView<Byte> view;
     view.width = width_, view.height = height_;
+    view.bits = bits_;
     bool even = true;
     for (int c = 0; c < 4; ++c) {
       if (!has(c)) continue;
@@ -117,6 +132,7 @@ class VideoPicture {
  private:
   VideoLayout layout_;
   int width_, height_;
+  SampleBits bits_;
   std::array<ptrdiff_t, 4> row_stride_{};
   std::array<std::unique_ptr<BeforeTheEdge<uint8_t>>, 4> planes_;
 };

@@ -73,17 +73,19 @@ PackedPicture deepened(const PackedPicture& from, int depth) {
   }
   return to;
 }
-// The first of the picture's bytes as planes of 4:2:0.
-ImageView shared_view(const PackedPicture& picture) {
+// The first samples of the picture, which has `depth` bits, as planes of 4:2:0.
+ImageView shared_view(const PackedPicture& picture, int depth) {
   ImageView view;
   view.width = picture.width;
   view.height = picture.height;
-  const ptrdiff_t along = (picture.width + 1) / 2, down = (picture.height + 1) / 2;
+  view.bits = {depth, 0};
+  const ptrdiff_t size = depth > 8 ? 2 : 1, along = size * ((picture.width + 1) / 2),
+                  down = (picture.height + 1) / 2;
   view.channel[0] = picture.bytes.data();
-  view.channel[1] = view.channel[0] + ptrdiff_t{picture.width} * picture.height;
+  view.channel[1] = view.channel[0] + size * picture.width * picture.height;
   view.channel[2] = view.channel[1] + along * down;
-  view.own[0] = {1, picture.width, 1, 1};
-  view.own[1] = view.own[2] = {1, along, 2, 2};
+  view.own[0] = {size, size * picture.width, 1, 1};
+  view.own[1] = view.own[2] = {size, along, 2, 2};
   return view;
 }
 template <typename Byte>
@@ -151,11 +153,12 @@ double run(const Case& c) {
     for (int t = 0; t < (others > 0 ? c.window + others : 0) + frames; ++t) {
       paint(t, c.alpha, &picture);
       if (t >= c.window && t < c.window + others) turn(&picture);
-      if (c.depth > 8) {
-        deep = deepened(picture, c.depth);
+      if (c.depth > 8) deep = deepened(picture, c.depth);
+      if (c.shared) {
+        const PackedPicture& samples = c.depth > 8 ? deep : picture;
+        see([&] { status = engine.push(shared_view(samples, c.depth)); });
+      } else if (c.depth > 8) {
         see([&] { status = engine.push(deep_view<const uint8_t>(deep, c)); });
-      } else if (c.shared) {
-        see([&] { status = engine.push(shared_view(picture)); });
       } else {
         see([&] { status = engine.push(picture.in()); });
       }
@@ -279,9 +282,9 @@ TEST(Memory, OfSharedChroma) {
   if (!allocator::sees_all()) GTEST_SKIP();
   for (Method method : {Method::robust, Method::qdmd, Method::dmd})
     for (Mode mode : {Mode::batch, Mode::live})
-      for (int threads : {1, 3}) {
+      for (const auto& [threads, depth] : {std::pair{1, 8}, {3, 8}, {2, 10}}) {
         Case c;
-        c.method = method, c.mode = mode, c.threads = threads;
+        c.method = method, c.mode = mode, c.threads = threads, c.depth = depth;
         c.width = 201, c.height = 151, c.window = 60;
         c.shared = true;
         check(c);

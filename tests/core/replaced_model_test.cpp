@@ -3,7 +3,9 @@
 
 #include "core/engine/background.h"
 #include "core/learn/gram_learner.h"
+#include "core/model/build_spread.h"
 #include "tests/core/engine_util.h"
+#include "tests/core/layouts.h"
 
 namespace qdmd::test {
 namespace {
@@ -78,6 +80,51 @@ TEST(Background, ModelThatIsNoNumberIsReplacedByTheMean) {
       EXPECT_FALSE(background.report().replaced);
       EXPECT_EQ(background.solves(), 2u);
     }
+}
+
+// Of pixels that share samples of more than 8 bits all bits are in it.
+TEST(Background, MeanOfSharedSamplesOfMoreThanEightBits) {
+  constexpr int kWidth = 131, kHeight = 7, kFrames = 4;
+  LearnOptions options;
+  options.method = Method::qdmd;
+  const SampleBits bits = {10, 6};
+  const FrameContents contents = {1, 0, 2, 2, bits.low()};
+  FrameStore frames(kFrames, kWidth, kHeight, contents);
+  const VideoLayout layout = of_words(kVideoLayouts[2]);
+  const auto word = [](int t, int c, int x, int y) {
+    return (x * 7 + y * 13 + 90 * c) % 700 + 4 * t * (c + 1);
+  };
+  for (int t = 0; t < kFrames; ++t) {
+    VideoPicture picture(layout, kWidth, kHeight, 3, bits);
+    for (int c = 0; c < kChannels; ++c)
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+          const ChannelAt& at = layout.at[static_cast<size_t>(c)];
+          picture.put_word(c, x, y, word(t, c, x / at.columns, y / at.rows));
+        }
+    ASSERT_TRUE(frames.append(picture.view<const uint8_t>()));
+  }
+  BackgroundModel model;
+  model.set_low_bits(bits.low());
+  Pool pool(2);
+  const SnapshotRange whole = frames.whole(frames.window());
+  model.begin(whole, mean_of_frames(kFrames), true);
+  build_spread(whole, 0, whole.pixels(), &pool, &model);
+  model.set_time(1);
+  std::vector<uint16_t> out(3 * whole.pixels());
+  uint16_t* const rows[3] = {out.data(), out.data() + whole.pixels(),
+                             out.data() + 2 * whole.pixels()};
+  for (size_t first = 0; first < whole.pixels(); first += kMaxRun) {
+    uint16_t* const at[3] = {rows[0] + first, rows[1] + first, rows[2] + first};
+    model.evaluate_deep(first, std::min(kMaxRun, whole.pixels() - first), at);
+  }
+  for (int c = 0; c < kChannels; ++c)
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const ChannelAt& at = layout.at[static_cast<size_t>(c)];
+        const int mean = word(0, c, x / at.columns, y / at.rows) + 6 * (c + 1);
+        ASSERT_EQ(rows[c][y * kWidth + x], mean) << c << " at " << x << ", " << y;
+      }
 }
 
 }  // namespace

@@ -12,12 +12,13 @@
 namespace qdmd::test {
 namespace {
 
-// A still picture with noise, over which a bright square goes; light that changes, and a camera
-// that is pushed aside, if they are wanted.
+// A still picture with noise, over which a bright square goes; light that changes, a camera that is
+// pushed aside, and a square that stands and leaves, if they are wanted.
 struct Scene {
   int width, height;
   bool light = false;
   int pushed_from = 1 << 20;  // frame
+  int stands_until = 0;       // frame
 
   void paint(int t, VideoPicture* frame) const {
     std::mt19937 noise(static_cast<unsigned>(t));
@@ -30,12 +31,23 @@ struct Scene {
           int level = 60 + (u * 37 / 4 % 64 + v * 23 / 3 % 50) + (u / 9 + v / 7) % 2 * 25 + 9 * c;
           if (u >= 2 * t && u < 2 * t + width / 4 && v > height / 3 && v < 2 * height / 3)
             level = 230 - 70 * c;
+          if (t < stands_until && x > width / 2 && x < 3 * width / 4 && y < height / 3)
+            level = 40 + 90 * c;
           if (light && t % 8 > 3) level = level * 9 / 10;
-          frame->sample(c, x, y) = static_cast<uint8_t>(level + static_cast<int>(noise() % 5));
+          level += static_cast<int>(noise() % 5);
+          put(c, x, y, level, static_cast<int>(noise() & 255), frame);
         }
     }
     for (int y = 0; frame->has(3) && y < height; ++y)
-      for (int x = 0; x < width; ++x) frame->sample(3, x, y) = static_cast<uint8_t>(x * y + t);
+      for (int x = 0; x < width; ++x) put(3, x, y, (x * y + t) & 255, x & 255, frame);
+  }
+  // below: of samples of more than 8 bits the bits below.
+  static void put(int c, int x, int y, int level, int below, VideoPicture* frame) {
+    const SampleBits bits = frame->bits();
+    if (bits.is_deep())
+      frame->put_word(c, x, y, level << bits.low() | (below & ((1 << bits.low()) - 1)));
+    else
+      frame->sample(c, x, y) = static_cast<uint8_t>(level);
   }
 };
 
@@ -47,12 +59,13 @@ std::vector<std::vector<uint8_t>> run(const EngineOptions& options, const VideoL
                                       const Scene& scene, int frames, int* moved) {
   Engine engine;
   EXPECT_TRUE(engine.configure(options, scene.width, scene.height).ok());
-  VideoPicture in(layout, scene.width, scene.height, 3);
+  const SampleBits bits = {options.depth, options.depth == 10 ? 6 : 0};
+  VideoPicture in(layout, scene.width, scene.height, 3, bits);
   std::vector<std::vector<uint8_t>> all;
   const auto pop_all = [&] {
     for (; engine.ready(); engine.skip())
       for (int more = 0; more < 2; ++more) {
-        VideoPicture out(layout, scene.width, scene.height, 1);
+        VideoPicture out(layout, scene.width, scene.height, 1, bits);
         engine.write(kOutputs[(all.size() + static_cast<size_t>(more)) % 4], options.levels,
                      out.view<uint8_t>());
         all.push_back(out.bytes());
@@ -87,7 +100,8 @@ int expect_the_same(EngineOptions options, const VideoLayout& layout, const Scen
   SCOPED_TRACE(std::string(layout.name) + " " + std::to_string(scene.width) + "x" +
                std::to_string(scene.height) + ", method " +
                std::to_string(static_cast<int>(options.method)) + ", mode " +
-               std::to_string(static_cast<int>(options.mode)));
+               std::to_string(static_cast<int>(options.mode)) + ", " +
+               std::to_string(options.depth) + " bits");
   int moved = 0, moved_too = 0;
   const auto plain = run(options, layout, scene, frames, &moved);
   options.chroma_columns = layout.at[1].columns;
@@ -152,15 +166,63 @@ TEST(SharedEngine, CameraIsPushed) {
     }
 }
 
+// Of samples of more than 8 bits both digits are shared: in what is solved, decided, mended and
+// written. Below 2 levels of threshold all pixels are compared in full.
+TEST(SharedEngine, MoreThanEightBits) {
+  for (int depth : {10, 12, 16})
+    for (Mode mode : {Mode::batch, Mode::live})
+      for (const VideoLayout& layout : kVideoLayouts) {
+        if (layout.at[1].columns != 2) continue;
+        EngineOptions options = options_of(Method::robust, mode);
+        options.depth = depth;
+        options.foreground_threshold = depth == 12 ? 1.5 : 0;
+        const VideoLayout words = of_words(layout);
+        expect_the_same(options, words, {67, 43});
+        expect_the_same(options, words, {1, 1}, 15);
+        expect_the_same(options, words, {3, 5}, 15);
+      }
+}
+
+TEST(SharedEngine, MoreThanEightBitsInEverythingElse) {
+  const VideoLayout p010 = of_words(kVideoLayouts[2]);
+  EngineOptions options = options_of(Method::robust, Mode::live);
+  options.depth = 10;
+  options.mask_softness = 3;
+  options.iterations = 2;
+  expect_the_same(options, p010, {161, 79, true}, 50);
+  for (Mode mode : {Mode::batch, Mode::live}) {
+    options = options_of(Method::robust, mode);
+    options.depth = 10;
+    options.stabilize = Stabilize::translation;
+    EXPECT_GT(expect_the_same(options, p010, {320, 160, false, 17}, 60), 0);
+  }
+  // What is uncovered is mended.
+  options = options_of(Method::robust, Mode::live);
+  for (int depth : {8, 10}) {
+    options.depth = depth;
+    Scene scene = {161, 79};
+    scene.stands_until = 60;
+    expect_the_same(options, depth == 8 ? kVideoLayouts[2] : p010, scene, 90);
+  }
+  for (Method method : {Method::qdmd, Method::dmd}) {
+    options = options_of(method, Mode::batch);
+    options.depth = 10;
+    options.sample_step = 2;
+    expect_the_same(options, p010, {67, 43});
+  }
+}
+
 TEST(SharedEngine, TakesLessMemory) {
-  for (Method method : {Method::robust, Method::qdmd, Method::dmd}) {
+  for (const auto& [method, depth] :
+       {std::pair{Method::robust, 8}, {Method::qdmd, 8}, {Method::dmd, 8}, {Method::robust, 10}}) {
     EngineOptions options = options_of(method, Mode::batch);
     options.window_size = 100;
+    options.depth = depth;
     options.dmd.rank = 1;
     const auto plain = static_cast<double>(layout_of(options, 1920, 1080).bytes);
     options.chroma_columns = options.chroma_rows = 2;
     const auto shared = static_cast<double>(layout_of(options, 1920, 1080).bytes);
-    EXPECT_LT(shared, 0.62 * plain) << static_cast<int>(method);
+    EXPECT_LT(shared, 0.62 * plain) << static_cast<int>(method) << ", " << depth << " bits";
   }
 }
 

@@ -47,6 +47,11 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
                                  const Gain& light, BackgroundModel* model) const {
   const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
   const double unit = 1.0 / (1 << frames.low_bits());
+  const auto sample_of = [&](int t, int c, size_t pixel) {
+    uint8_t high, low;
+    return *read_samples(frames, t, c, pixel, 1, &high) << frames.low_bits() |
+           *read_low_samples(frames, t, c, pixel, 1, &low);
+  };
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;
     for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
@@ -58,7 +63,7 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
           // In order: there are a few.
           double samples[kMendingFrames];
           for (int t = 0; t < frames.size(); ++t) {
-            const double sample = frames.sample(t, c, p);
+            const double sample = sample_of(t, c, p);
             int at = t;
             for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
             samples[at] = sample;
