@@ -35,6 +35,11 @@ class Writer {
     }
     at_[3] = out.spacing(3);
     is_grey_ = out.channel[1] == out.channel[0] && out.channel[2] == out.channel[0];
+    for (int c = 0; c < 3; ++c) {
+      is_constant_[c] = task.output == Output::mask && has(c) && black_[c] == white_[c];
+      for (int r = 0; is_constant_[c] && r < 2; ++r)
+        std::fill_n(room_.shown[r][c], kMaxRun, black_[c]);
+    }
     find_pairs();
     find_fours();
   }
@@ -42,7 +47,7 @@ class Writer {
   void write(const Block& block) {
     for (int r = 0; r < block.rows; ++r) {
       for (int c = 0; c < 3; ++c)
-        if (has(c)) make_row(c, r, block);
+        if (has(c) && !is_constant_[c]) make_row(c, r, block);
       if (out_.alpha) make_alpha(r, block);
     }
     if (fours_) {
@@ -170,6 +175,7 @@ class Writer {
   const uint16_t* samples_of(int c, int r, const Block& block, uint16_t* room) const {
     const Spacing& at = at_[c];
     const uint16_t* const above = room_.shown[r][c];
+    if (is_constant_[c]) return above;
     const uint16_t* const below = block.rows == 1 || at.rows == 1 ? nullptr : room_.shown[1][c];
     if (at.columns == 2) {
       mean_of_pairs(above, below, block.count, room);
@@ -216,6 +222,7 @@ class Writer {
   Spacing at_[4];
   uint16_t black_[3], white_[3];
   bool is_grey_ = false, pairs_ = false, fours_ = false;
+  bool is_constant_[3] = {};  // the same in the whole picture: chroma of masks
   int first_of_pair_ = 1;
   size_t order_[4] = {};  // channels and alpha, as they lie
   Room room_;
