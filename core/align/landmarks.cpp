@@ -41,6 +41,35 @@ float smoothed(const uint8_t* at, ptrdiff_t stride, float u, float v) {
   return sum / 16;
 }
 
+// Pixels of a row that are looked at together.
+constexpr int kTogether = 64;
+
+// The steepest pixel of a part of a picture.
+struct Steepest {
+  int slope = 0;  // of its eight neighbours, 8 times that of a pixel
+  int x = 0, y = 0;
+
+  // Looks at `count` pixels of a row from column `left` on; of equal ones the first counts.
+  void look(const uint8_t* row, int left, int count, int at_y, ptrdiff_t along, ptrdiff_t across) {
+    uint16_t slopes[kTogether];
+    for (int first = left; first < left + count; first += kTogether) {
+      const int size = std::min(kTogether, left + count - first);
+      const uint8_t *a = row + first - along, *b = row + first + along;
+      uint16_t most = 0;
+      for (int i = 0; i < size; ++i) {
+        const int difference =
+            (b[i - across] + 2 * b[i] + b[i + across]) - (a[i - across] + 2 * a[i] + a[i + across]);
+        slopes[i] = static_cast<uint16_t>(std::abs(difference));
+        most = std::max(most, slopes[i]);
+      }
+      if (most <= slope) continue;
+      slope = most;
+      x = first + static_cast<int>(std::find(slopes, slopes + size, most) - slopes);
+      y = at_y;
+    }
+  }
+};
+
 }  // namespace
 
 Landmarks::Landmarks(int most)
@@ -70,22 +99,15 @@ void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int
       // Half of them at edges of each direction.
       const bool upright = (row + col) % 2 == 0;
       const ptrdiff_t along = upright ? 1 : stride, across = upright ? stride : 1;
-      int best = 0, best_x = 0, best_y = 0;
-      for (int y = kBorder + row * side; y < kBorder + (row + 1) * side; ++y) {
-        const uint8_t* const at = picture.samples + y * stride;
-        for (int x = kBorder + col * side; x < kBorder + (col + 1) * side; ++x) {
-          const uint8_t *a = at + x - along, *b = at + x + along;
-          const int slope =
-              std::abs((b[-across] + 2 * b[0] + b[across]) - (a[-across] + 2 * a[0] + a[across]));
-          if (slope > best) best = slope, best_x = x, best_y = y;
-        }
-      }
-      if (best < 8 * kLeastSlope) continue;
-      if (ignored.has(best_x * ignored_scale, best_y * ignored_scale)) continue;
-      const uint8_t* const at = picture.samples + best_y * stride + best_x;
+      Steepest best;
+      for (int y = kBorder + row * side; y < kBorder + (row + 1) * side; ++y)
+        best.look(picture.samples + y * stride, kBorder + col * side, side, y, along, across);
+      if (best.slope < 8 * kLeastSlope) continue;
+      if (ignored.has(best.x * ignored_scale, best.y * ignored_scale)) continue;
+      const uint8_t* const at = picture.samples + best.y * stride + best.x;
       const auto i = static_cast<size_t>(count_++);
-      x_[i] = static_cast<int32_t>(best_x);
-      y_[i] = static_cast<int32_t>(best_y);
+      x_[i] = static_cast<int32_t>(best.x);
+      y_[i] = static_cast<int32_t>(best.y);
       level_[i] = smoothed(at, stride);
       right_[i] = (smoothed(at + 1, stride) - smoothed(at - 1, stride)) / 2;
       down_[i] = (smoothed(at + stride, stride) - smoothed(at - stride, stride)) / 2;

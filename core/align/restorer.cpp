@@ -18,12 +18,18 @@ uint64_t Restorer::bytes(int width, int height) {
   return (2 * kChannels + 2) * static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
 }
 
-void Restorer::write_canvas(const BackgroundModel& model, size_t pixels) {
-  for (size_t first = 0; first < pixels; first += kMaxRun) {
+void Restorer::write_canvas(const BackgroundModel& model, size_t pixels, Pool* pool) {
+  const auto write = [&](size_t run) {
+    const size_t first = run * kMaxRun;
     uint8_t* const out[3] = {canvas_[0].get() + first, canvas_[1].get() + first,
                              canvas_[2].get() + first};
     model.evaluate(first, std::min(kMaxRun, pixels - first), out);
-  }
+  };
+  const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
+  if (pool)
+    pool->run(runs, write);
+  else
+    for (size_t run = 0; run < runs; ++run) write(run);
 }
 
 void Restorer::restore_level(const Pose& pose, const uint8_t* const frame[3], Resampler* resampler,

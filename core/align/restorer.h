@@ -18,8 +18,8 @@ class Restorer {
   Restorer(int width, int height);
   static uint64_t bytes(int width, int height);
 
-  // Takes a background's picture as it is on the canvas, which is `pixels` large.
-  void write_canvas(const BackgroundModel& model, size_t pixels);
+  // Takes a background's picture as it is on the canvas, which is `pixels` large. pool may be null.
+  void write_canvas(const BackgroundModel& model, size_t pixels, Pool* pool);
   const uint8_t* canvas(int channel) const { return canvas_[static_cast<size_t>(channel)].get(); }
   // The same picture seen from `pose`; frame: the frame's own planes.
   void restore_level(const Pose& pose, const uint8_t* const frame[3], Resampler* resampler,

@@ -267,7 +267,7 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   Resampler* const resampler = &stabilizer_->resampler();
   Pool* const pool = workers_->idle_pool();
   if (level) {
-    restorer_->write_canvas(*task->model, frames_.window().pixels());
+    restorer_->write_canvas(*task->model, frames_.window().pixels(), pool);
     restorer_->restore_level(pose, task->x, resampler, pool);
     for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
     task->level_stride = static_cast<size_t>(frames_.width());

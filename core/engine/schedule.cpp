@@ -17,7 +17,7 @@ bool Schedule::take(const ImageView& frame) {
       (referred_to_ == 0 || stabilizer->frames_since_reference() >= kReferenceFrames)) {
     referred_to_ = background().solves();
     show_newest();
-    stage_.restorer->write_canvas(background().model(), frames().window().pixels());
+    stage_.restorer->write_canvas(background().model(), frames().window().pixels(), idle_pool());
     stabilizer->refer_to(stage_.restorer->canvas(stabilizer->channel()), ignored);
   }
   const PlaneSlots& planes = frames().window();
