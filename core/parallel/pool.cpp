@@ -30,6 +30,7 @@ void Pool::start(int threads) {
   may_look_ = wanted < std::thread::hardware_concurrency();
   try {
     beds_ = std::make_unique<Bed[]>(wanted);
+    shares_ = std::make_unique<Share[]>(wanted + 1);
     workers_.reserve(wanted);
     for (size_t worker = 1; worker <= wanted; ++worker)
       workers_.emplace_back([this, worker] { work(worker); });
@@ -50,13 +51,24 @@ void Pool::stop() {
   stopping_ = false;
 }
 
-void Pool::do_parts(const Job& job, size_t parts, size_t worker, Time then) noexcept {
-  do {
-    // The mutex, which every worker takes before and after, orders what the parts read and write.
-    const size_t part = next_part_.fetch_add(1, std::memory_order_relaxed);
-    if (part >= parts) return;
-    job.call(job.task, part, worker);
-  } while (then == Time::max() || std::chrono::steady_clock::now() < then);
+void Pool::share_out(size_t parts) {
+  for (size_t worker = 0; worker < threads(); ++worker) {
+    shares_[worker].next.store(parts * worker / threads(), std::memory_order_relaxed);
+    shares_[worker].end = parts * (worker + 1) / threads();
+  }
+}
+
+void Pool::do_parts(const Job& job, size_t worker, Time then) noexcept {
+  for (size_t i = 0; i < threads(); ++i) {
+    Share& share = shares_[(worker + i) % threads()];
+    for (;;) {
+      // The mutex, which every worker takes before and after, orders what the parts read and write.
+      const size_t part = share.next.fetch_add(1, std::memory_order_relaxed);
+      if (part >= share.end) break;
+      job.call(job.task, part, worker);
+      if (then != Time::max() && std::chrono::steady_clock::now() >= then) return;
+    }
+  }
 }
 
 // Returns once ready(), or at the time `then`. ready() looks at what the mutex guards.
@@ -97,16 +109,15 @@ void Pool::run_job(size_t parts, Job job) noexcept {
   {
     const std::lock_guard lock(mutex_);
     job_ = job;
-    parts_ = parts;
+    share_out(parts);
     ++jobs_begun_;
-    next_part_.store(0, std::memory_order_relaxed);
     helping = helping_;
     woken = std::min(others, workers_.size() - (kept_ ? 1 : 0));
     change();
   }
   for (size_t worker = 1; worker <= woken; ++worker) wake(worker);
   if (helping) helper_.notify_one();
-  do_parts(job, parts, 0, Time::max());
+  do_parts(job, 0, Time::max());
   std::unique_lock lock(mutex_);
   // A worker that has not woken by now finds nothing to do: only those inside are waited for.
   job_ = {};
@@ -116,10 +127,9 @@ void Pool::run_job(size_t parts, Job job) noexcept {
 // Does parts of the job that is open.
 void Pool::join(size_t worker, Time then, std::unique_lock<std::mutex>* lock) noexcept {
   const Job job = job_;
-  const size_t parts = parts_;
   ++busy_;
   lock->unlock();
-  do_parts(job, parts, worker, then);
+  do_parts(job, worker, then);
   lock->lock();
   if (--busy_ == 0) {
     change();
@@ -128,17 +138,30 @@ void Pool::join(size_t worker, Time then, std::unique_lock<std::mutex>* lock) no
 }
 
 void Pool::work(size_t worker) noexcept {
-  uint64_t seen = 0;
+  uint64_t seen = 0, roused = 0;
   std::unique_lock lock(mutex_);
   const auto may_join = [&] {
     return job_.call && jobs_begun_ != seen && !(kept_ && worker == workers_.size());
   };
   for (;;) {
-    await(&lock, &beds_[worker - 1], Time::max(), [&] { return stopping_ || may_join(); });
+    await(&lock, &beds_[worker - 1], Time::max(),
+          [&] { return stopping_ || may_join() || roused_ != roused; });
     if (stopping_) return;
+    roused = roused_;
+    if (!may_join()) continue;
     seen = jobs_begun_;
     join(worker, Time::max(), &lock);
   }
+}
+
+void Pool::rouse() {
+  if (!may_look_) return;
+  {
+    const std::lock_guard lock(mutex_);
+    ++roused_;
+    change();
+  }
+  for (size_t worker = 1; worker < threads(); ++worker) wake(worker);
 }
 
 void Pool::keep_place() {

@@ -17,8 +17,10 @@ namespace qdmd {
 // Runs the parts of one piece of work on several threads, the caller's among them. The others are
 // started once. Between calls they look for work for some microseconds, and then sleep: the passes
 // of a frame follow each other so quickly that waking a thread would take longer than its parts.
-// Which thread does which part differs from call to call, so parts must write to places of their
-// own, or combine to the same result in any order.
+// A thread begins with the parts that it has in every call, so that what it knows of a band of a
+// picture is still in its cache in the next pass and in the next frame; then it does what others
+// have left. So which thread does which part may differ from call to call: parts must write to
+// places of their own, or combine to the same result in any order.
 class Pool {
  public:
   // `threads` counts the caller of run(); fewer work where the system starts no more.
@@ -51,6 +53,10 @@ class Pool {
     run_job(parts, {call, std::addressof(task)});
   }
 
+  // run() comes in a moment: threads that sleep look for work again. To wake them takes so long
+  // that a first short pass would be over before they begin.
+  void rouse();
+
   // The calling thread is going to give another one work to do that calls run(), and goes on
   // beside it. Until open_place(), one thread fewer helps there, so that there are never more at
   // work than cores; help() takes its place. Not while run() runs.
@@ -68,6 +74,11 @@ class Pool {
     void (*call)(const void* task, size_t part, size_t worker) noexcept = nullptr;
     const void* task = nullptr;
   };
+  // The parts that a thread begins with: `next` to `end` are not begun yet.
+  struct alignas(64) Share {
+    std::atomic<size_t> next{0};
+    size_t end = 0;
+  };
   // Where one thread sleeps. The last one is for help().
   using Bed = std::condition_variable;
 
@@ -76,7 +87,8 @@ class Pool {
   void run_job(size_t parts, Job job) noexcept;
   void work(size_t worker) noexcept;
   void join(size_t worker, Time then, std::unique_lock<std::mutex>* lock) noexcept;
-  void do_parts(const Job& job, size_t parts, size_t worker, Time then) noexcept;
+  void share_out(size_t parts);
+  void do_parts(const Job& job, size_t worker, Time then) noexcept;
   template <typename Ready>
   void await(std::unique_lock<std::mutex>* lock, Bed* bed, Time then, const Ready& ready) noexcept;
   void wake(size_t worker) { beds_[worker - 1].notify_one(); }
@@ -87,16 +99,16 @@ class Pool {
   std::unique_ptr<Bed[]> beds_;  // of the workers
   // What the mutex guards.
   Job job_;                  // open to workers where `call` is set
-  size_t parts_ = 0;         // of job_
   uint64_t jobs_begun_ = 0;  // a worker joins each of them at most once
+  uint64_t roused_ = 0;      // calls of rouse()
   size_t busy_ = 0;          // workers inside job_
   bool stopping_ = false;
   bool kept_ = false;     // the last worker's place
   bool helping_ = false;  // somebody waits in it
 
   std::atomic<uint64_t> changes_{0};  // of the above: what those look at who do not sleep yet
-  std::atomic<size_t> next_part_{0};
-  bool may_look_ = false;  // there is a core for each thread
+  std::unique_ptr<Share[]> shares_;   // of the caller of run(), and of the workers
+  bool may_look_ = false;             // there is a core for each thread
   std::vector<std::thread> workers_;
 };
 

@@ -28,6 +28,11 @@ class Workers {
   // The pool, or null while the work beside has it.
   Pool* idle_pool() { return idle() ? &pool_ : nullptr; }
 
+  // A pass comes in a moment (Pool::rouse), unless the work beside has the pool.
+  void rouse() {
+    if (idle()) pool_.rouse();
+  }
+
   // SideThread's, of the work beside.
   bool start(std::function<void()> work);
   void finish();

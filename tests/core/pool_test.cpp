@@ -92,6 +92,40 @@ TEST(Pool, OneSlowThreadLeavesItsPartsToTheOthers) {
   EXPECT_EQ(std::count(worker_of.begin() + 1, worker_of.end(), worker_of[0]), 0);
 }
 
+// What a thread had of a picture is still in its cache.
+TEST(Pool, ThreadsBeginWithTheSamePartsInEveryCall) {
+  constexpr size_t kThreads = 3, kParts = 7;
+  Pool pool(kThreads);
+  for (int call = 0; call < 50; ++call) {
+    std::atomic<size_t> begun = 0;
+    std::vector<size_t> worker_of(kParts, kThreads);
+    pool.run(kParts, [&](size_t part, size_t worker) {
+      worker_of[part] = worker;
+      // Until all have begun: nobody has time to take what is another one's.
+      if (++begun > kThreads) return;
+      while (begun < kThreads) std::this_thread::yield();
+    });
+    for (size_t worker = 0; worker < kThreads; ++worker)
+      EXPECT_EQ(worker_of[kParts * worker / kThreads], worker) << "call " << call;
+  }
+}
+
+// Whether they still look for work then, sleep again, or have not woken.
+TEST(Pool, RousedThreadsDoTheirParts) {
+  Pool pool(3);
+  for (int microseconds : {0, 20, 100, 2000})
+    for (int call = 0; call < 20; ++call) {
+      pool.rouse();
+      if (call % 4 == 3) pool.rouse();
+      std::this_thread::sleep_for(std::chrono::microseconds(microseconds));
+      std::vector<int> done(9);
+      pool.run(done.size(), [&](size_t part) { ++done[part]; });
+      ASSERT_EQ(done, std::vector<int>(9, 1)) << microseconds;
+    }
+  // And nothing is left to do for those who are asleep when it ends.
+  pool.rouse();
+}
+
 TEST(Pool, CanBeMadeAndDestroyedWithoutWork) {
   for (int k = 0; k < 50; ++k) Pool pool(k % 5);
 }
