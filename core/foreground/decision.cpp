@@ -21,6 +21,9 @@ namespace {
 
 // Pixels whose share of a pass is worth waking a thread for.
 constexpr size_t kPixelsPerPart = 16384;
+// Rows that are compared and explained together, at least, and strips of rows at most: what differs
+// is at one place of a picture, and all threads are to have a share of it.
+constexpr int kStrip = 8, kMostStrips = 64;
 // Pixels at most so far from foreground may say nothing of noise.
 constexpr int kMostNear = 16;
 // Pixels that are looked at together, at most: whole blocks.
@@ -126,6 +129,7 @@ Decision::Shape::Shape(int width_, const Band& band, bool votes)
       step(search_step(width, band.height())),
       margin(kPlaces * step),
       reach(votes ? voting_reach(width, band.height()) : 0),
+      strips(std::clamp(height / std::max({kStrip, margin, kShadingReach}), 1, kMostStrips)),
       stride(static_cast<size_t>(width + 2 * margin)) {}
 
 Decision::Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps,
@@ -136,7 +140,8 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
       knows_light_(steps.light && colours != Colours::grey),
       texture_(width, band, steps.constants),
       noise_(width, band.rows(), steps.constants, band.first()),
-      specks_(width, band.height()) {
+      specks_(width, band.height()),
+      unknown_(static_cast<size_t>(shape_.strips)) {
   for (auto& level : of_.level) level.resize(shape_.padded());
   of_.differing.resize(shape_.padded());
   of_.foreground.resize(shape_.padded());
@@ -201,9 +206,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
   // Fewer parts than rows, so that each has some.
-  const Grid& grid = texture_.grid();
   const int parts = static_cast<int>(
-      std::clamp<size_t>(shape_.pixels() / kPixelsPerPart, 1, static_cast<size_t>(grid.rows)));
+      std::clamp<size_t>(shape_.pixels() / kPixelsPerPart, 1, static_cast<size_t>(shape_.strips)));
   look(parts);
   if (now_.textures) {
     // The second frame is the first one that can differ from what was there before: it is looked
@@ -212,9 +216,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     texture_.end_frame(frame.x, !again);
     if (again) {
       clear_marks();
-      in_bands(grid.rows, parts, [&](int first, int size) {
-        for (int row = first; row < first + size; ++row) explain(row);
-      });
+      in_bands(shape_.height, parts, [&](int first, int size) { explain(first, size); });
       texture_.end_frame(frame.x);
     }
   }
@@ -278,33 +280,36 @@ void Decision::clear_marks() {
     std::fill(of_.shaded.begin(), of_.shaded.end(), uint8_t{0});
 }
 
-// What differs, and what of it is foreground. A row of cells is explained as soon as the rows of
-// pixels around it are known, which are still near then, but for those at the ends of bands.
+// What differs, and what of it is foreground. A strip of rows is explained by the thread that
+// compares the last of the rows around it, which are still near then.
 void Decision::look(int parts) {
   clear_marks();
-  const Grid& grid = texture_.grid();
-  const int around = std::max(kShadingReach, shape_.margin);
-  // Rows of cells that a band ends in may be thin: nothing is beyond them.
-  const bool at_once = !now_.means && band_.height() / grid.rows >= around;
-  const auto soon = [&](int row, int first, int end) {
-    return at_once && (row > first || first == 0) && (row + 1 < end || end == grid.rows);
+  const int strips = shape_.strips;
+  const auto in_strips = [&](const auto& work) {
+    const auto strip = [&](size_t index) {
+      const int top = shape_.top(static_cast<int>(index));
+      work(static_cast<int>(index), top, shape_.top(static_cast<int>(index) + 1) - top);
+    };
+    if (now_.pool && parts > 1)
+      now_.pool->run(static_cast<size_t>(strips), strip);
+    else
+      for (int index = 0; index < strips; ++index) strip(static_cast<size_t>(index));
   };
-  // Bands of one row have no middle.
-  const int bands = now_.pool ? std::min(parts, static_cast<int>(now_.pool->threads())) : 1;
-  in_bands(grid.rows, bands, [&](int first, int size) {
-    const int end = first + size;
-    for (int row = first; row < end; ++row) {
-      compare(top(row), top(row + 1) - top(row));
-      if (row > first && soon(row - 1, first, end)) explain(row - 1);
-    }
-    if (soon(end - 1, first, end)) explain(end - 1);
+  for (int index = 0; index < strips; ++index) {
+    const int beside = (index > 0 ? 1 : 0) + (index + 1 < strips ? 1 : 0);
+    unknown_[static_cast<size_t>(index)].store(1 + beside, std::memory_order_relaxed);
+  }
+  in_strips([&](int index, int top, int count) {
+    compare(top, count);
+    if (now_.means) return;
+    for (int i = std::max(index - 1, 0); i <= std::min(index + 1, strips - 1); ++i)
+      // What others have compared is seen here.
+      if (unknown_[static_cast<size_t>(i)].fetch_sub(1, std::memory_order_acq_rel) == 1)
+        explain(shape_.top(i), shape_.top(i + 1) - shape_.top(i));
   });
-  if (now_.means)
-    in_bands(shape_.height, parts, [&](int first, int size) { compare_means(first, size); });
-  in_bands(grid.rows, bands, [&](int first, int size) {
-    for (int row = first; row < first + size; ++row)
-      if (!soon(row, first, first + size)) explain(row);
-  });
+  if (!now_.means) return;
+  in_strips([&](int, int top, int count) { compare_means(top, count); });
+  in_strips([&](int, int top, int count) { explain(top, count); });
 }
 
 // L, and which pixels differ from it.
@@ -357,13 +362,21 @@ void Decision::repeat_border(uint8_t* row) const {
   std::memset(row + shape_.width, row[shape_.width - 1], margin);
 }
 
-// One row of cells. Only what differs is looked at, and what moves.
-void Decision::explain(int grid_row) {
+// Only what differs is looked at, and what moves.
+void Decision::explain(int first_row, int row_count) {
   const Grid& grid = texture_.grid();
-  const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
+  int grid_row = -1;
+  size_t first_cell = 0;
   bool moving = false;
-  for (int col = 0; col < grid.cols; ++col) moving |= moves(first_cell + static_cast<size_t>(col));
-  for (int y = top(grid_row); y < top(grid_row + 1); ++y) {
+  for (int y = first_row; y < first_row + row_count; ++y) {
+    if (grid_row < 0 || grid.top(grid_row + 1) <= band_.first() + y) {
+      do ++grid_row;
+      while (grid.top(grid_row + 1) <= band_.first() + y);
+      first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
+      moving = false;
+      for (int col = 0; col < grid.cols; ++col)
+        moving |= moves(first_cell + static_cast<size_t>(col));
+    }
     const uint8_t* const differing = differing_row(y);
     uint8_t* const foreground = foreground_row(y);
     const auto busy = [&](int left) {

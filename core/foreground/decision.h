@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -91,6 +92,7 @@ class Decision {
   // sides; the background is searched `step` pixels apart, and `reach` pixels vote.
   struct Shape {
     int width, height, step, margin, reach;
+    int strips;  // of rows, each as high as what explain() sees around a row
     size_t stride;
 
     Shape(int width, const Band& band, bool votes);
@@ -101,6 +103,8 @@ class Decision {
       return static_cast<size_t>(y) * stride + static_cast<size_t>(margin);
     }
     size_t first(int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width); }
+    // Of a strip; that behind the last one is the height.
+    int top(int strip) const { return static_cast<int>(int64_t{height} * strip / strips); }
   };
   // Of the frame: L, what differs from it, and what is foreground before and after the vote; and
   // where light alone differs.
@@ -133,17 +137,13 @@ class Decision {
   void in_bands(int length, int bands, Band band);
   void clear_marks();
   void share_mask();
-  // Of the rows that are kept: where those of a row of cells begin, and that row of the mask, of
-  // the picture's if there is none.
-  int top(int grid_row) const {
-    return std::clamp(texture_.grid().top(grid_row) - band_.first(), 0, band_.rows());
-  }
+  // Of the rows that are kept that row of the mask, of the picture's if there is none.
   const uint8_t* mask_row(int y) const;
   void look(int parts);
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
   void compare_means(int first_row, int row_count);
-  void explain(int grid_row);
+  void explain(int first_row, int row_count);
   void explain_run(int y, int left, int right, int grid_row);
   void look_at(Run* run);
   void look_around(Run* run);
@@ -161,6 +161,8 @@ class Decision {
   MovingTexture texture_;
   PixelNoise noise_;
   Specks specks_;
+  // Of each strip: itself and those beside it, while a frame's are not compared yet.
+  std::vector<std::atomic<int>> unknown_;
   std::vector<uint8_t> whole_, packed_;  // of a band: the picture's mask, and its bits
   int64_t frames_ = 0;
   uint64_t picture_ = 0;  // of the model: whose L there is

@@ -1,6 +1,7 @@
 #include "core/foreground/moving_texture.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -65,10 +66,13 @@ void MovingTexture::add(size_t cell, const Sample& sample, double threshold) {
     explained += differs & (sample.nearest[p] < nearer * sample.own[p] >> 16);
     restless += differs & (sample.moved[p] > still);
   }
-  cells_[cell].differ += differ;
-  cells_[cell].explained += explained;
+  const auto count = [](int* sum, int more) {
+    std::atomic_ref<int>(*sum).fetch_add(more, std::memory_order_relaxed);
+  };
+  count(&cells_[cell].differ, differ);
+  count(&cells_[cell].explained, explained);
   // Nothing is known of a frame before the first one.
-  if (frames_ > 0) cells_[cell].restless += restless;
+  if (frames_ > 0) count(&cells_[cell].restless, restless);
 }
 
 // Of the pixels that members have found in their own rows.

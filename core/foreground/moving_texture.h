@@ -45,7 +45,7 @@ class MovingTexture {
   bool samples(int y) const { return y % row_step_ == 0; }
   // Of such a row in the frame before: a plane's samples.
   const uint8_t* before(int channel, int y) const { return before_.data() + offset(channel, y); }
-  // threshold: levels above which pixels differ. Threads have cells of their own.
+  // threshold: levels above which pixels differ. From any threads.
   void add(size_t cell, const Sample& sample, double threshold);
   // After the last cell of a frame whose planes, the rows that are kept, are x. last: the next
   // cells are of another frame.
