@@ -222,9 +222,10 @@ OutputTask Engine::next_task(Output output) {
 void Engine::read_next(int slot, OutputTask* task) {
   const bool deep = frames_.low_bits() > 0;
   if (!read_) {
-    read_planes(frames_.window().picture(slot), next_chroma_.get(), next_);
+    Pool* const pool = workers_->idle_pool();
+    read_planes(frames_.window().picture(slot), next_chroma_.get(), next_, pool);
     uint8_t* const room = next_chroma_.get() + room_for_planes(frames_.window().shape());
-    if (deep) read_planes(frames_.low_picture(slot), room, next_low_);
+    if (deep) read_planes(frames_.low_picture(slot), room, next_low_, pool);
   }
   read_ = true;
   std::copy_n(next_, kChannels, task->x);

@@ -9,7 +9,8 @@ constexpr int64_t kReferenceFrames = 50;
 }  // namespace
 
 bool Schedule::take(const ImageView& frame) {
-  if (!frames().append(frame)) return false;
+  if (background().known()) workers().rouse();
+  if (!frames().append(frame, idle_pool())) return false;
   Stabilizer* const stabilizer = stage_.stabilizer;
   if (!stabilizer || no_room_) return true;
   const IgnoredAreas& ignored = background().wishes().ignored;

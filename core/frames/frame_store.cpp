@@ -1,10 +1,12 @@
 #include "core/frames/frame_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <limits>
 #include <utility>
 
+#include "core/passes/bands.h"
 #include "core/passes/chroma.h"
 #include "core/passes/digits.h"
 #include "core/passes/planes.h"
@@ -36,6 +38,14 @@ size_t spread_size(int width, const FrameContents& contents) {
 // What the alpha samples of `frame` are if all are equal: its first one, 255 where it has none.
 uint8_t first_alpha(const ImageView& frame) {
   return frame.alpha && !frame.alpha_is_padding ? *frame.alpha : uint8_t{255};
+}
+
+// Rows first .. end - 1 of `width` samples of a channel, which pixels share as in the plane.
+void copy_rows(const ImageView& frame, int channel, int first, int end, int width, uint8_t* plane) {
+  const Spacing at = frame.spacing(channel);
+  for (int y = first; y < end; ++y)
+    spread_samples(frame.channel[channel] + y * at.row_stride, at.pixel_stride, 1,
+                   static_cast<size_t>(width), plane + ptrdiff_t{y} * width);
 }
 
 }  // namespace
@@ -96,7 +106,7 @@ uint64_t FrameStore::bytes() const {
          poses_.size() * sizeof(Pose);
 }
 
-bool FrameStore::append(const ImageView& frame) {
+bool FrameStore::append(const ImageView& frame, Pool* pool) {
   const int slot = planes_.append();
   ++frames_taken_;
   poses_[static_cast<size_t>(slot)] = {};
@@ -104,27 +114,27 @@ bool FrameStore::append(const ImageView& frame) {
     low_.pad(slot);
     take_deep_planes(slot, frame);
     if (!take_deep_alpha(slot, frame)) return false;
-    take_contents(slot);
+    take_contents(slot, pool);
     return true;
   }
   const uint8_t alpha = first_alpha(frame);
-  const bool constant = take_planes(slot, frame, alpha);
+  const bool constant = take_planes(slot, frame, alpha, pool);
   varies_[static_cast<size_t>(slot)] = !constant;
   constant_alpha_[static_cast<size_t>(slot)] = alpha;
   if (!constant && !keep_alpha(slot, frame)) return false;
-  take_contents(slot);
+  take_contents(slot, pool);
   return true;
 }
 
 // What is made of the planes.
-void FrameStore::take_contents(int slot) {
+void FrameStore::take_contents(int slot, Pool* pool) {
   const KeptPicture picture = planes_.picture(slot);
   if (sample_step_ > 1) {
     take_every_step(picture, slot, &samples_);
     if (low_bits_ > 0) take_every_step(low_.picture(slot), slot, &low_samples_);
   }
   if (cells_.cells() == 0) return;
-  find_own_cells(grid_, band_, picture, &cells_, slot);
+  find_own_cells(grid_, band_, picture, &cells_, slot, pool);
   if (band_.is_whole()) return;
   to_share_[static_cast<size_t>(slot)] = 1;
   any_to_share_ = true;
@@ -200,7 +210,7 @@ bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool*
   }
   if (low_bits_ > 0) keep_low_of_moved(slot, pose, was_moved);
   poses_[static_cast<size_t>(slot)] = pose;
-  take_contents(slot);
+  take_contents(slot, pool);
   return true;
 }
 
@@ -216,20 +226,25 @@ void FrameStore::keep_low_of_moved(int slot, const Pose& pose, bool was_moved) {
 }
 
 // True: every alpha sample is `alpha`.
-bool FrameStore::take_planes(int slot, const ImageView& frame, uint8_t alpha) {
+bool FrameStore::take_planes(int slot, const ImageView& frame, uint8_t alpha, Pool* pool) {
   const ChromaShape& shape = planes_.shape();
   uint8_t* const planes[3] = {planes_.plane(slot, 0), planes_.plane(slot, 1),
                               planes_.plane(slot, 2)};
-  if (!shape.is_shared()) return split_channels(frame, 0, height_, alpha, planes);
-  for (int c = 0; c < kChannels; ++c) {
-    const Spacing at = frame.spacing(c);
-    const int width = c == 0 ? width_ : shape.chroma_width();
-    const int height = c == 0 ? height_ : shape.chroma_height();
-    for (int y = 0; y < height; ++y)
-      spread_samples(frame.channel[c] + y * at.row_stride, at.pixel_stride, 1,
-                     static_cast<size_t>(width), planes[c] + ptrdiff_t{y} * width);
+  std::atomic<bool> constant{true};
+  if (!shape.is_shared()) {
+    for_rows(pool, height_, planes_.pixels(), [&](int first, int count) {
+      if (!split_channels(frame, first, count, alpha, planes)) constant = false;
+    });
+    return constant;
   }
-  return is_constant_alpha(frame, 0, height_, alpha);
+  for_rows(pool, shape.chroma_height(), planes_.pixels(), [&](int first, int count) {
+    const int top = first * shape.rows, end = std::min(top + count * shape.rows, height_);
+    copy_rows(frame, 0, top, end, width_, planes[0]);
+    for (int c = 1; c < kChannels; ++c)
+      copy_rows(frame, c, first, first + count, shape.chroma_width(), planes[c]);
+    if (!is_constant_alpha(frame, top, end - top, alpha)) constant = false;
+  });
+  return constant;
 }
 
 // Where the planes do not keep shared samples once, each for all pixels that share it.

@@ -48,8 +48,8 @@ class FrameStore {
   // Takes a copy of the frame, in place of the oldest where the store is full. Where samples are
   // kept once, the frame's pixels share them. False: its alpha
   // varies, which needs more than `most_bytes`. Throws std::bad_alloc. The newest frame is then
-  // undefined.
-  bool append(const ImageView& frame);
+  // undefined. pool may be null.
+  bool append(const ImageView& frame, Pool* pool = nullptr);
   // The planes, samples and cells of frame `index` become what the canvas shows of them; the planes
   // as they came stay in untouched(). Of more than 8 bits, moved planes have the highest 8, and
   // below them the middle of what there can be. What is outside of the frame is as in the frame
@@ -114,8 +114,8 @@ class FrameStore {
     return alpha_.get() + static_cast<size_t>(slot) * planes_.pixels();
   }
   bool keep_alpha(int slot, const ImageView& frame);
-  bool take_planes(int slot, const ImageView& frame, uint8_t alpha);
-  void take_contents(int slot);
+  bool take_planes(int slot, const ImageView& frame, uint8_t alpha, Pool* pool);
+  void take_contents(int slot, Pool* pool);
   void take_every_step(const KeptPicture& picture, int slot, PlaneSlots* samples);
   void take_deep_planes(int slot, const ImageView& frame);
   bool take_deep_alpha(int slot, const ImageView& frame);

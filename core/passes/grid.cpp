@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "core/passes/bands.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/grid.cpp"
 #include "core/passes/simd.h"
@@ -161,14 +163,20 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
 }
 
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame) {
-  const int first = row_at(grid, band.own_first()), end = row_at(grid, band.own_end());
-  for (int c = 0; c < kChannels; ++c) {
-    Samples samples = {picture.plane[c], band.first()};
-    if (c > 0 && picture.shape.is_shared())
-      samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
-    means_of_rows(grid, first, end, samples, cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
-  }
+                    GridFrames* cells, int frame, Pool* pool) {
+  const int own = row_at(grid, band.own_first()), rows = row_at(grid, band.own_end()) - own;
+  const size_t pixels =
+      static_cast<size_t>(grid.width) * static_cast<size_t>(grid.top(own + rows) - grid.top(own));
+  for_rows(pool, rows, pixels, [&](int at, int count) {
+    const int first = own + at;
+    for (int c = 0; c < kChannels; ++c) {
+      Samples samples = {picture.plane[c], band.first()};
+      if (c > 0 && picture.shape.is_shared())
+        samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
+      means_of_rows(grid, first, first + count, samples,
+                    cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
+    }
+  });
 }
 
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame) {

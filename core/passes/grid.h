@@ -7,6 +7,7 @@
 
 #include "core/base/channels.h"
 #include "core/gram/window.h"
+#include "core/parallel/pool.h"
 #include "core/parallel/band.h"
 
 namespace qdmd {
@@ -85,9 +86,9 @@ void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
 // The same of all channels of a picture into picture `frame` of `cells`, where the picture has the
 // band's rows only: the cells of its own rows. Bands end where rows of cells do, and their pictures
-// share no samples.
+// share no samples. pool may be null.
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame);
+                    GridFrames* cells, int frame, Pool* pool);
 // All members have the cells that each of them found, for good.
 void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/passes/bands.h"
 #include "core/passes/chroma.h"
 
 namespace qdmd {
@@ -48,25 +49,24 @@ const uint8_t* read_low_samples(const SnapshotRange& snapshots, int index, int c
                       room);
 }
 
-void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3]) {
+void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3], Pool* pool) {
   std::copy_n(picture.plane, kChannels, planes);
   const ChromaShape& shape = picture.shape;
   if (!shape.is_shared()) return;
   const auto width = static_cast<size_t>(shape.width);
-  for (size_t c = 1; c < kChannels; ++c) {
-    uint8_t* const to = room + (c - 1) * shape.pixels();
-    for (int y = 0; y < shape.height; ++y) {
-      uint8_t* const row = to + static_cast<size_t>(y) * width;
-      // Rows that share samples are alike.
-      if (y % shape.rows != 0)
-        std::memcpy(row, row - width, width);
-      else
-        spread_samples(planes[c] + static_cast<size_t>(y / shape.rows) *
-                                       static_cast<size_t>(shape.chroma_width()),
-                       1, 2, width, row);
-    }
-    planes[c] = to;
-  }
+  const auto samples = static_cast<size_t>(shape.chroma_width());
+  for_rows(pool, shape.chroma_height(), shape.pixels(), [&](int first, int count) {
+    for (size_t c = 1; c < kChannels; ++c)
+      for (int shared = first; shared < first + count; ++shared) {
+        const int y = shared * shape.rows;
+        uint8_t* const row = room + (c - 1) * shape.pixels() + static_cast<size_t>(y) * width;
+        spread_samples(planes[c] + static_cast<size_t>(shared) * samples, 1, 2, width, row);
+        // Rows that share samples are alike.
+        for (int more = 1; more < shape.rows && y + more < shape.height; ++more)
+          std::memcpy(row + static_cast<size_t>(more) * width, row, width);
+      }
+  });
+  for (size_t c = 1; c < kChannels; ++c) planes[c] = room + (c - 1) * shape.pixels();
 }
 
 void RowReader::read(int y, const uint8_t* rows[3]) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/gram/window.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
@@ -19,8 +20,9 @@ const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int 
                             size_t first, size_t count, uint8_t* room);
 
 // The planes of a picture. Where pixels share samples, those of channels 1 and 2 are made in
-// `room`, which has room_for_planes() bytes; else it may be null.
-void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3]);
+// `room`, which has room_for_planes() bytes; else it may be null. pool may be null.
+void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3],
+                 Pool* pool = nullptr);
 inline size_t room_for_planes(const ChromaShape& shape) {
   return shape.is_shared() ? (kChannels - 1) * shape.pixels() : 0;
 }

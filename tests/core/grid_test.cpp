@@ -71,6 +71,7 @@ TEST(Cells, MeansAreThoseOfTheirPixels) {
 }
 
 TEST(Cells, MeansOfSharedSamplesAreThoseOfTheirPixels) {
+  Pool pool(3);
   for (const auto& [width, height] : kSizes)
     for (int rows : {1, 2})
       // Cells that begin and end inside of a sample, too; and of single pixels.
@@ -84,7 +85,7 @@ TEST(Cells, MeansOfSharedSamplesAreThoseOfTheirPixels) {
           for (auto* plane : {&brightness, &first, &second}) fill(plane, height > 90, &rng);
           const uint8_t* const planes[] = {brightness.data(), first.data(), second.data()};
           GridFrames cells(grid, 2);
-          find_own_cells(grid, Band(height), KeptPicture(planes, shape), &cells, 1);
+          find_own_cells(grid, Band(height), KeptPicture(planes, shape), &cells, 1, &pool);
           for (int c = 0; c < kChannels; ++c)
             for (int row = 0; row < grid.rows; ++row)
               for (int col = 0; col < grid.cols; ++col)

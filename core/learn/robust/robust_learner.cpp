@@ -561,7 +561,7 @@ bool RobustLearner::is_calm() const {
 void RobustLearner::end(BackgroundModel* model) {
   const uint8_t* const level[kChannels] = {reference_.level[0].data(), reference_.level[1].data(),
                                            reference_.level[2].data()};
-  find_own_cells(grid_, band_, level, &background_cells_, 1 - published_);
+  find_own_cells(grid_, band_, level, &background_cells_, 1 - published_, room_.pool);
   share_cells(grid_, band_, &background_cells_, 1 - published_);
   if (parameters_.earlier_share > 0)
     earlier_.take(grid_, reference_, spread_, background_cells_, 1 - published_, stable_,
