@@ -7,8 +7,8 @@
 
 #include "core/base/channels.h"
 #include "core/gram/window.h"
-#include "core/parallel/pool.h"
 #include "core/parallel/band.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
