@@ -57,6 +57,8 @@ long() {
     case "$target" in
       # The rest of them needs plugins, or takes long.
       *element*) set -- --gtest_filter='PropertyStorm*:Threads*:*OtherThreads*:Freeze*:Reset*:Pads.ComeAndGo*:Flow*:Queries*:Elements*:Clocks*' ;;
+      # Others of them have one thread.
+      *decision*) set -- --gtest_filter='Decision.*' ;;
       *) set -- ;;
     esac
     "$build/$target" --gtest_brief=1 "$@"
