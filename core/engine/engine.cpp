@@ -12,12 +12,6 @@
 #include "core/passes/residual.h"
 
 namespace qdmd {
-namespace {
-
-// Pixels whose share of a pass is worth waking a thread for.
-constexpr size_t kPixelsPerBand = 16384;
-
-}  // namespace
 
 // What an exception leaves half done is dropped.
 template <typename Action>
@@ -360,17 +354,11 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     return_to_frame(&task, output == Output::background || output == Output::foreground);
     const int top = band().own_begin(), height = band().own_rows(), together = rows_together(out);
     const int steps = (height + together - 1) / together;
-    const auto write = [&](int first, int count, size_t) {
+    const auto write = [&](int first, int count) {
       const int row = first * together;
       write_picture(task, levels, out, top + row, std::min(count * together, height - row));
     };
-    if (Pool* const pool = workers_->idle_pool()) {
-      const auto bands = std::clamp<size_t>(frames_.window().pixels() / kPixelsPerBand, 1,
-                                            static_cast<size_t>(steps));
-      for_bands(*pool, steps, static_cast<int>(bands), write);
-    } else {
-      write(0, steps, 0);
-    }
+    for_rows(workers_->idle_pool(), steps, frames_.window().pixels(), write);
   });
 }
 

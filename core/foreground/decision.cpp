@@ -19,8 +19,6 @@
 namespace qdmd {
 namespace {
 
-// Pixels whose share of a pass is worth waking a thread for.
-constexpr size_t kPixelsPerPart = 16384;
 // Rows that are compared and explained together, at least, and strips of rows at most: what differs
 // is at one place of a picture, and all threads are to have a share of it.
 constexpr int kStrip = 8, kMostStrips = 64;
@@ -185,16 +183,10 @@ void Decision::level(int y, const uint8_t* out[3]) const {
   for (size_t c = 0; c < kChannels; ++c) out[c] = of_.level[c].data() + shape_.offset(y);
 }
 
-// In as many bands, on the pool's threads.
-template <typename Band>
-void Decision::in_bands(int length, int bands, Band band) {
-  if (now_.pool && bands > 1)
-    for_bands(*now_.pool, length, bands, [&](int first, int size, size_t) { band(first, size); });
-  else
-    band(0, length);
-}
-
 void Decision::decide(const Comparison& frame, Pool* pool) {
+  const auto in_rows = [&](const auto& band) {
+    for_rows(pool, shape_.height, shape_.pixels(), band);
+  };
   now_.frame = frame;
   now_.pool = pool;
   // Without limits of pixels, ghosts look like noise, and like textures.
@@ -205,10 +197,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.whole = frame.low[0] && !now_.means;
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
-  // Fewer parts than rows, so that each has some.
-  const int parts = static_cast<int>(
-      std::clamp<size_t>(shape_.pixels() / kPixelsPerPart, 1, static_cast<size_t>(shape_.strips)));
-  look(parts);
+  look();
   if (now_.textures) {
     // The second frame is the first one that can differ from what was there before: it is looked
     // at again now that it is known what moves in it.
@@ -216,13 +205,13 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     texture_.end_frame(frame.x, !again);
     if (again) {
       clear_marks();
-      in_bands(shape_.height, parts, [&](int first, int size) { explain(first, size); });
+      in_rows([&](int first, int size) { explain(first, size); });
       texture_.end_frame(frame.x);
     }
   }
   const bool learns = steps_.noise && !frame.fixed;
   if (learns) noise_.remember(of_.mask.data());
-  in_bands(shape_.height, parts, [&](int first, int size) {
+  in_rows([&](int first, int size) {
     vote({of_.foreground.data() + shape_.offset(0), shape_.stride, shape_.width, shape_.height,
           shape_.reach},
          first, size, of_.mask.data());
@@ -242,7 +231,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   if (!band_.is_whole())
     std::copy_n(whole_.data() + shape_.first(band_.first()), shape_.pixels(), of_.mask.data());
   if (learns) {
-    in_bands(shape_.height, parts, [&](int first, int size) { learn(first, size); });
+    in_rows([&](int first, int size) { learn(first, size); });
     noise_.end_frame();
   }
   ++frames_;
@@ -282,7 +271,7 @@ void Decision::clear_marks() {
 
 // What differs, and what of it is foreground. A strip of rows is explained by the thread that
 // compares the last of the rows around it, which are still near then.
-void Decision::look(int parts) {
+void Decision::look() {
   clear_marks();
   const int strips = shape_.strips;
   const auto in_strips = [&](const auto& work) {
@@ -290,7 +279,7 @@ void Decision::look(int parts) {
       const int top = shape_.top(static_cast<int>(index));
       work(static_cast<int>(index), top, shape_.top(static_cast<int>(index) + 1) - top);
     };
-    if (now_.pool && parts > 1)
+    if (now_.pool && is_shared_out(shape_.pixels()))
       now_.pool->run(static_cast<size_t>(strips), strip);
     else
       for (int index = 0; index < strips; ++index) strip(static_cast<size_t>(index));

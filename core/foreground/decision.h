@@ -133,13 +133,11 @@ class Decision {
   uint8_t* foreground_row(int y) { return of_.foreground.data() + shape_.offset(y); }
   const DecisionConstants& constants() const { return steps_.constants; }
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
-  template <typename Band>
-  void in_bands(int length, int bands, Band band);
   void clear_marks();
   void share_mask();
   // Of the rows that are kept that row of the mask, of the picture's if there is none.
   const uint8_t* mask_row(int y) const;
-  void look(int parts);
+  void look();
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
   void compare_means(int first_row, int row_count);

@@ -81,7 +81,6 @@ class FrameStore {
     return range.in(samples()).with_low(sample_step_ > 1 ? low_samples_ : low_, low_bits_);
   }
   // What is below the planes, where low_bits() is not 0.
-  const uint8_t* low(int slot, int channel) const { return low_.plane(slot, channel); }
   KeptPicture low_picture(int slot) const { return low_.picture(slot); }
 
   // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.

@@ -13,9 +13,6 @@ namespace {
 // Pixels of all snapshots that are spread at once: they stay in the second-level cache.
 constexpr size_t kRun = 1024;
 
-// Pixels whose share of a pass is worth waking a thread for.
-constexpr size_t kPixelsPerPart = 16384;
-
 // `read(t, channel, first, count, room)` says where samples of snapshot t are: in `room`, which has
 // space for kRun of them, or elsewhere.
 template <typename Sample, typename Read>
@@ -28,7 +25,7 @@ void build_runs(int snapshots, size_t first, size_t count, const Read& read, Poo
       std::make_unique_for_overwrite<Sample[]>(planes_of_run * kRun * pool->threads());
   const auto planes =
       std::make_unique_for_overwrite<const Sample*[]>(planes_of_run * pool->threads());
-  const auto parts = static_cast<int>(std::max<size_t>(1, count / kPixelsPerPart));
+  const auto parts = static_cast<int>(std::max<size_t>(1, count / kWorthAThread));
   pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
     const Slice slice = {static_cast<int>(part), parts};
     const size_t begin = first + slice.first(count, kUnit), end = begin + slice.size(count, kUnit);

@@ -39,13 +39,17 @@ void for_bands(Pool& pool, int length, int count, Band band) {
   });
 }
 
+// Pixels whose share of a pass over a frame is worth waking a thread for.
+inline constexpr size_t kWorthAThread = 16384;
+// Whether several threads are worth it for so many pixels in all.
+inline bool is_shared_out(size_t pixels) { return pixels >= 2 * kWorthAThread; }
+
 // The same for `pixels` pixels in all, on as many threads as that is worth; on the caller's where
 // the pool is null. band(first, size).
 template <typename Band>
 void for_rows(Pool* pool, int length, size_t pixels, Band band) {
-  constexpr size_t kPixelsPerPart = 16384;
   const auto most = static_cast<size_t>(std::max(length, 1));
-  const auto count = static_cast<int>(std::clamp<size_t>(pixels / kPixelsPerPart, 1, most));
+  const auto count = static_cast<int>(std::clamp<size_t>(pixels / kWorthAThread, 1, most));
   if (pool && count > 1)
     for_bands(*pool, length, count, [&](int first, int size, size_t) { band(first, size); });
   else

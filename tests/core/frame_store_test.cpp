@@ -187,7 +187,7 @@ TEST(DeepFrameStore, KeepsWhatCameOfFramesThatAreMoved) {
     for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p) {
       ASSERT_EQ(store.untouched(slot, c)[p] << 4 | store.untouched_low(slot, c)[p],
                 frame.sample(c, p));
-      ASSERT_EQ(store.low(slot, c)[p], 8);
+      ASSERT_EQ(store.low_picture(slot).plane[c][p], 8);
     }
   ASSERT_TRUE(store.steady(0, Pose(), &resampler, &pool));
   const SnapshotRange whole = store.whole(store.window());
