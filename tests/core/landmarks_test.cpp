@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <random>
+#include <tuple>
 #include <vector>
 
 namespace qdmd::test {
@@ -85,7 +87,7 @@ void expect_landmarks(const Picture& picture, int most, const IgnoredAreas& igno
   landmarks.choose(picture.view(), ignored, scale);
   ASSERT_EQ(landmarks.count(), static_cast<int>(expected.size()));
   ASSERT_GE(landmarks.count(), Landmarks::kFewest);
-  // Levels are sixteenths: any other place has another one.
+  // A landmark at any other place sees a brighter pixel: 8 levels at least.
   constexpr double kSame = 1.0 / 32;
   const auto share = [&](const std::vector<Pixel>& pixels) {
     return landmarks.share_within(changed_beside(picture, pixels).view(), 0, 0, {}, kSame);
