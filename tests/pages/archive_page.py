@@ -1,7 +1,9 @@
 """Times qdmd-archive on one core and on two, counts its bytes, and puts both and a model of larger
 jobs into a page.
 
-usage: archive_page.py PAGE VIDEO FOLDER      VIDEO may be empty: a simulated scene takes its place
+usage: archive_page.py PAGE VIDEO FOLDER [memory]
+
+VIDEO may be empty: a simulated scene takes its place. memory: the table of memory only
 """
 import json
 import os
@@ -35,6 +37,9 @@ CASES = {
 # Of the model: an 8K recording, in windows of so many frames; machines of one core each.
 MODEL_WIDTH, MODEL_HEIGHT, MODEL_WINDOW = 7680, 4320, 2000
 MACHINES = (1, 2, 4, 8, 16, 32, 64)
+MEMORY_PROCESSES = (1, 2, 3, 4)
+MEMORY_CASES = [(WIDTH, HEIGHT, FRAMES, 'qdmd'), (WIDTH, HEIGHT, FRAMES, 'robust'),
+                (1280, 720, FEW, 'robust'), (640, 480, FEW, 'robust')]
 
 
 def launch(pipeline, core=None):
@@ -151,17 +156,24 @@ def bytes_table(reports):
                        *(f'{report["processes"]} processes' for report in reports)], rows)
 
 
-def memory_table(reports, bare):
-    window = 3 * WIDTH * HEIGHT * FRAMES
-    rows = []
-    for report, without in zip(reports, bare):
-        most = [(whole - base) / window for whole, base in
-                zip(report['of-process']['most-memory'], without['of-process']['most-memory'])]
-        rows.append([str(report['processes']), f'{max(most):.3f}',
-                     f'{1 / report["processes"] + 0.1:.3f}',
-                     f'{max(without["of-process"]["most-memory"]) / 2**20:.0f} MiB'])
-    return page.table(['processes', f'most memory of one for its window of {FRAMES} frames, of the whole window',
-                       'promised', 'beside that (decoding, one frame\'s pictures)'], rows)
+def memory_table(folder, video):
+    """Beside what the same job takes with windows of two frames."""
+    rows = [['1/n and a tenth', *(f'{1 / n + 0.1:.3f}' for n in MEMORY_PROCESSES), '']]
+    for width, height, frames, method in MEMORY_CASES:
+        film, little = (clip(video, folder, width, height, count) for count in (frames, 20))
+        window = 3 * width * height * frames
+        row, beside = [f'`{method}`, {frames} frames of {width}x{height}'], 0
+        for n in MEMORY_PROCESSES:
+            print(f'\rmemory: {row[0]}, {n} processes    ', end='', file=sys.stderr)
+            whole, bare = (run(folder, [of], n, method, ['background'], size, 'none')
+                           ['of-process']['most-memory']
+                           for of, size in ((film, frames), (little, 2)))
+            row.append(f'{max(a - b for a, b in zip(whole, bare)) / window:.3f}')
+            beside = max(beside, *bare)
+        rows.append([*row, f'{beside / 2**20:.0f} MiB'])
+    print(file=sys.stderr)
+    return page.table(['most memory of a process, of the whole window',
+                       *(f'n = {n}' for n in MEMORY_PROCESSES), 'at most beside that'], rows)
 
 
 def model_table(found, decode, convert):
@@ -204,7 +216,10 @@ def model_table(found, decode, convert):
 
 
 def main():
-    target, video, folder = sys.argv[1:]
+    target, video, folder = sys.argv[1:4]
+    if sys.argv[4:] == ['memory']:
+        page.put(target, {'memory': memory_table(folder, video)})
+        return
     film, short = (clip(video, folder, WIDTH, HEIGHT, frames) for frames in (FRAMES, FEW))
     found = times(folder, film, short)
     every = ['background', 'mask', 'foreground']
@@ -213,14 +228,13 @@ def main():
     for report, of_qdmd in zip(reports, products):
         report['bytes-received-a-frame']['products'] = \
             of_qdmd['bytes-received-a-frame']['products']
-    bare = [run(folder, [short], n, 'qdmd', ['background'], 2, 'none') for n in (2, 3, 4)]
     decode, convert = decoding(folder, video, MODEL_WIDTH, MODEL_HEIGHT, 12)
     pathlib.Path(folder, 'load-after').write_text(subprocess.check_output(['uptime'], text=True))
     page.put(target, {
         'speed': speed_table(found),
         'parts': parts_table(found),
         'bytes': bytes_table(reports),
-        'memory': memory_table(products, bare),
+        'memory': memory_table(folder, video),
         'model': model_table(found, decode, convert),
         'machine': page.machine(folder),
     })
