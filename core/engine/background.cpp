@@ -57,11 +57,22 @@ void Background::return_to(const Learnt& learnt) {
 void Background::remember(Learnt* learnt) const {
   const BackgroundModel& model = models_[newest_];
   const size_t count = pixels();
+  learnt->low_bits = model.low_bits();
   for (auto& level : learnt->level) level.resize(count);
+  for (auto& low : learnt->low) low.resize(model.low_bits() > 0 ? count : 0);
   for (size_t first = 0; first < count; first += kMaxRun) {
-    uint8_t* const out[3] = {learnt->level[0].data() + first, learnt->level[1].data() + first,
-                             learnt->level[2].data() + first};
-    model.evaluate(first, std::min(kMaxRun, count - first), out);
+    const auto of = [first](std::vector<uint8_t>* planes, uint8_t** out) {
+      for (size_t c = 0; c < kChannels; ++c) out[c] = planes[c].data() + first;
+    };
+    const size_t run = std::min(kMaxRun, count - first);
+    uint8_t *high[3], *low[3];
+    of(learnt->level, high);
+    if (model.low_bits() == 0) {
+      model.evaluate(first, run, high);
+      continue;
+    }
+    of(learnt->low, low);
+    model.evaluate_digits(first, run, high, low);
   }
   if (model.limits()) learnt->limits.assign(model.limits(), model.limits() + count);
   learnt->noise = report_.foreground.noise;
@@ -70,7 +81,8 @@ void Background::remember(Learnt* learnt) const {
 
 void Background::show(const Learnt& learnt, State state) {
   const bool limits = learner_->makes_limits() && !learnt.limits.empty();
-  model().freeze_as(learnt.level, limits ? &learnt.limits : nullptr, pixels());
+  model().freeze_as(learnt.level, learnt.low, learnt.low_bits, limits ? &learnt.limits : nullptr,
+                    pixels());
   learner_->follow(learnt.level);
   report_ = {};
   report_.foreground.noise = learnt.noise;

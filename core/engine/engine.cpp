@@ -55,7 +55,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   background_->learner().set_absorb_frames(absorb_frames_);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
-    restorer_ = std::make_unique<Restorer>(width, height);
+    restorer_ = std::make_unique<Restorer>(width, height, options.low_bits());
   }
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_,
                        &clock_,  stabilizer_.get(), restorer_.get()};
@@ -263,8 +263,11 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   Pool* const pool = workers_->idle_pool();
   if (level) {
     restorer_->write_canvas(*task->model, frames_.window().pixels(), pool);
-    restorer_->restore_level(pose, task->x, resampler, pool);
-    for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
+    restorer_->restore_level(pose, task->x, task->low, resampler, pool);
+    for (int c = 0; c < kChannels; ++c) {
+      task->level[c] = restorer_->level(c);
+      task->level_low[c] = restorer_->level_low(c);
+    }
     task->level_stride = static_cast<size_t>(frames_.width());
   }
   // What is ignored has its place in the frame.

@@ -68,9 +68,10 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks =
       Decision::bytes(width, band) + layout.soft_bytes + digits * room_for_planes(shape);
-  const uint64_t camera = options.stabilize == Stabilize::off
-                              ? 0
-                              : Stabilizer::bytes(width, height) + Restorer::bytes(width, height);
+  const uint64_t camera =
+      options.stabilize == Stabilize::off
+          ? 0
+          : Stabilizer::bytes(width, height) + Restorer::bytes(width, height, digits == 2);
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, masks + camera),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),

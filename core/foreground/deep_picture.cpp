@@ -149,12 +149,10 @@ class Writer {
       task_.model->evaluate_deep(first_pixel(block, r), block.count, out);
       return;
     }
-    // Somebody has made its high digits: it is in the middle of what they may be.
-    for (int c = 0; c < 3; ++c) {
-      const uint8_t* const level = task_.level[c] + y * task_.level_stride + block.left;
-      for (size_t p = 0; p < block.count; ++p)
-        out[c][p] = static_cast<uint16_t>((2 * level[p] + 1) << bits_.low() >> 1);
-    }
+    const size_t first = y * task_.level_stride + block.left;
+    for (int c = 0; c < 3; ++c)
+      join_digits(task_.level[c] + first, task_.level_low[c] + first, bits_.low(), block.count,
+                  out[c]);
   }
 
   void make_alpha(int r, const Block& block) {

@@ -56,8 +56,10 @@ struct OutputTask {
   // nulls.
   const uint8_t* level[3] = {nullptr, nullptr, nullptr};
   size_t level_stride = 0;
-  // Of samples of more than 8 bits what is below the highest 8, of x and of alpha; else nulls.
+  // Of samples of more than 8 bits what is below the highest 8, of x, `level` and alpha; else
+  // nulls.
   const uint8_t* low[3] = {nullptr, nullptr, nullptr};
+  const uint8_t* level_low[3] = {nullptr, nullptr, nullptr};  // as `level`
   const uint8_t* alpha_low = nullptr;
   uint8_t constant_alpha_low = 0;
 

@@ -200,29 +200,24 @@ bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool*
   const int slot = this->slot(index), before = index > 0 ? this->slot(index - 1) : slot;
   const bool was_moved = !this->pose(slot).is_rest();
   resampler->prepare(pool);
+  const Affine place = affine(inverse(pose), middle_of(width_, height_));
+  const size_t pixels = planes_.pixels();
   for (int c = 0; c < kChannels; ++c) {
-    uint8_t* const plane = planes_.plane(slot, c);
-    if (!was_moved) std::copy_n(plane, planes_.pixels(), untouched_.plane(slot, c));
-    std::copy_n(before != slot ? planes_.plane(before, c) : untouched_.plane(slot, c),
-                planes_.pixels(), plane);
-    resampler->run(untouched_.plane(slot, c), affine(inverse(pose), middle_of(width_, height_)),
-                   plane, width_, height_, pool);
+    const auto begin_as_before = [&](PlaneSlots* frames, PlaneSlots* untouched) {
+      uint8_t *const plane = frames->plane(slot, c), *const own = untouched->plane(slot, c);
+      if (!was_moved) std::copy_n(plane, pixels, own);
+      std::copy_n(before != slot ? frames->plane(before, c) : own, pixels, plane);
+    };
+    const bool deep = low_bits_ > 0;
+    begin_as_before(&planes_, &untouched_);
+    if (deep) begin_as_before(&low_, &untouched_low_);
+    resampler->run_deep(untouched_.plane(slot, c), deep ? untouched_low_.plane(slot, c) : nullptr,
+                        low_bits_, place, planes_.plane(slot, c),
+                        deep ? low_.plane(slot, c) : nullptr, width_, height_, pool);
   }
-  if (low_bits_ > 0) keep_low_of_moved(slot, pose, was_moved);
   poses_[static_cast<size_t>(slot)] = pose;
   take_contents(slot, pool);
   return true;
-}
-
-void FrameStore::keep_low_of_moved(int slot, const Pose& pose, bool was_moved) {
-  for (int c = 0; c < kChannels; ++c) {
-    uint8_t* const plane = low_.plane(slot, c);
-    if (!was_moved) std::copy_n(plane, planes_.pixels(), untouched_low_.plane(slot, c));
-    if (pose.is_rest())
-      std::copy_n(untouched_low_.plane(slot, c), planes_.pixels(), plane);
-    else
-      std::memset(plane, 1 << (low_bits_ - 1), planes_.pixels());
-  }
 }
 
 // True: every alpha sample is `alpha`.

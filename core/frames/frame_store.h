@@ -51,9 +51,8 @@ class FrameStore {
   // undefined. pool may be null.
   bool append(const ImageView& frame, Pool* pool = nullptr);
   // The planes, samples and cells of frame `index` become what the canvas shows of them; the planes
-  // as they came stay in untouched(). Of more than 8 bits, moved planes have the highest 8, and
-  // below them the middle of what there can be. What is outside of the frame is as in the frame
-  // before, or, where there is none, as in this one. False, and nothing is done: there is no room
+  // as they came stay in untouched(). What is outside of the frame is as in the frame before, or,
+  // where there is none, as in this one. False, and nothing is done: there is no room
   // in `most_bytes`, for that and for `beside` bytes that others take then. Where pixels share
   // samples, those of all frames get their own first, for good. Throws std::bad_alloc.
   bool steady(int index, const Pose& pose, Resampler* resampler, Pool* pool, uint64_t beside = 0);
@@ -120,7 +119,6 @@ class FrameStore {
   bool take_deep_alpha(int slot, const ImageView& frame);
   bool make_alpha();
   bool unshare(uint64_t beside);
-  void keep_low_of_moved(int slot, const Pose& pose, bool was_moved);
 
   Band band_;
   int width_ = 0, height_ = 0, sample_step_ = 1, low_bits_ = 0;

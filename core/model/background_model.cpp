@@ -5,6 +5,8 @@
 #include <atomic>
 #include <cmath>
 
+#include "core/passes/digits.h"
+
 namespace qdmd {
 namespace {
 
@@ -223,6 +225,16 @@ void BackgroundModel::evaluate_deep(size_t first, size_t count, uint16_t* const 
       count);
 }
 
+void BackgroundModel::evaluate_digits(size_t first, size_t count, uint8_t* const high[3],
+                                      uint8_t* const low[3]) const {
+  uint16_t samples[kChannels][kMaxRun];
+  uint16_t* const out[3] = {samples[0], samples[1], samples[2]};
+  evaluate_deep(first, count, out);
+  for (size_t c = 0; c < kChannels; ++c)
+    split_digits(reinterpret_cast<const uint8_t*>(samples[c]), sizeof(uint16_t), {8 + low_bits_, 0},
+                 count, high[c], low[c]);
+}
+
 void BackgroundModel::freeze_at(double t) {
   if (frozen_) return;
   set_time(t);
@@ -262,14 +274,19 @@ void BackgroundModel::make_room(size_t pixels, bool limits) {
 }
 
 void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
+                                const std::vector<uint8_t> low[kChannels], int low_bits,
                                 const std::vector<uint8_t>* limits, size_t pixels) {
   pixels_ = pixels;
   make_pictures(kChannels);
-  // Nobody knows the low digits: the middle of what they can be.
-  const float middle = low_bits_ > 0 ? 0.5f : 0;
+  // Nobody knows digits that the picture does not have: the middle of what they can be. Video of
+  // fewer bits has the picture's highest ones, as its frames would.
+  const bool deep = std::min(low_bits, low_bits_) > 0;
+  const auto unit = 1.0f / static_cast<float>(1 << low_bits);
+  const float middle = low_bits_ == 0 ? 0 : deep ? (low_bits_ > low_bits ? unit / 2 : 0) : 0.5f;
   for (size_t c = 0; c < kChannels; ++c)
-    std::transform(level[c].begin(), level[c].end(), pictures_[c],
-                   [middle](uint8_t sample) { return static_cast<float>(sample) + middle; });
+    for (size_t p = 0; p < pixels; ++p)
+      pictures_[c][p] = static_cast<float>(level[c][p]) + middle +
+                        (deep ? unit * static_cast<float>(low[c][p]) : 0);
   if (limits)
     limits_ = *limits;
   else

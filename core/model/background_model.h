@@ -87,9 +87,16 @@ class BackgroundModel {
   // The same, but the light is at each time what it was.
   void freeze_but_for_light(double t);
   // The same with a picture that no window made: planes of `pixels` samples, and limits or null.
-  // Throws only where make_room() was not called before.
+  // low: so many bits below the picture's samples, or 0 bits and empty planes. Throws only where
+  // make_room() was not called before.
+  void freeze_as(const std::vector<uint8_t> level[kChannels],
+                 const std::vector<uint8_t> low[kChannels], int low_bits,
+                 const std::vector<uint8_t>* limits, size_t pixels);
   void freeze_as(const std::vector<uint8_t> level[kChannels], const std::vector<uint8_t>* limits,
-                 size_t pixels);
+                 size_t pixels) {
+    const std::vector<uint8_t> none[kChannels];
+    freeze_as(level, none, 0, limits, pixels);
+  }
   // Where it throws, all is as it was.
   void make_room(size_t pixels, bool limits);
 
@@ -109,6 +116,9 @@ class BackgroundModel {
   void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
   // The same in units of the lowest bit, rounded.
   void evaluate_deep(size_t first, size_t count, uint16_t* const out[3]) const;
+  // These as digits. The high ones need not be evaluate()'s, which does not round up to them.
+  void evaluate_digits(size_t first, size_t count, uint8_t* const high[3],
+                       uint8_t* const low[3]) const;
 
  private:
   size_t picture_count() const { return pictures_.size(); }

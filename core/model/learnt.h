@@ -28,9 +28,12 @@ struct Learnt {
 
   int width = 0, height = 0;
   Colours colours = Colours::rgb;
-  std::vector<uint8_t> level[kChannels];  // L as it was shown
-  std::vector<uint8_t> limits;            // BackgroundModel::limits(), or empty
-  double noise = 0;                       // ForegroundStatistics::noise
+  std::vector<uint8_t> level[kChannels];  // L as it was shown, of more than 8 bits the highest
+  // So many bits below these, 0 to 8; where there are none, the planes are empty.
+  int low_bits = 0;
+  std::vector<uint8_t> low[kChannels];
+  std::vector<uint8_t> limits;  // BackgroundModel::limits(), or empty
+  double noise = 0;             // ForegroundStatistics::noise
   std::optional<EarlierWindow> earlier;
 };
 

@@ -20,7 +20,7 @@ constexpr uint64_t kMostPixels = uint64_t{1} << 36;
 
 struct Header {
   uint32_t version = 0, width = 0, height = 0, colours = 0, sections = 0, rows = 0, cols = 0;
-  uint32_t zero = 0;
+  uint32_t low_bits = 0;
   double noise = 0;
   uint64_t bytes = 0;
 
@@ -31,6 +31,7 @@ struct Header {
     uint64_t planes = kChannels;
     if (sections & kHasLimits) planes += 1;
     if (sections & kHasEarlier) planes += kChannels + 1;
+    if (low_bits > 0) planes += kChannels;
     return kLearntHeaderBytes + planes * pixels() + 2 * sizeof(float) * cells() + kChecksumBytes;
   }
 };
@@ -108,15 +109,16 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   Reader reader(bytes.subspan(kMagic.size()));
   Header h;
   for (uint32_t* number :
-       {&h.version, &h.width, &h.height, &h.colours, &h.sections, &h.rows, &h.cols, &h.zero})
+       {&h.version, &h.width, &h.height, &h.colours, &h.sections, &h.rows, &h.cols, &h.low_bits})
     *number = reader.number<uint32_t>();
   h.noise = std::bit_cast<double>(reader.number<uint64_t>());
   h.bytes = reader.number<uint64_t>();
-  if (h.version != kLearntVersion)
+  if (h.version < 1 || h.version > kLearntVersion)
     return bad("it has version " + std::to_string(h.version) +
-               " of the format, and this qdmdbackground reads version " +
+               " of the format, and this qdmdbackground reads versions 1 to " +
                std::to_string(kLearntVersion) + ": save it again with this one.");
   constexpr uint32_t kMost = std::numeric_limits<int32_t>::max();
+  const uint32_t most_low_bits = h.version == 1 ? 0 : 8;
   // Cells are no smaller than pixels.
   const bool grid = h.sections & kHasEarlier
                         ? h.rows > 0 && h.cols > 0 && h.rows <= h.height && h.cols <= h.width
@@ -124,7 +126,7 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   const bool sane = h.width > 0 && h.height > 0 && h.width <= kMost && h.height <= kMost &&
                     h.pixels() <= kMostPixels &&
                     h.colours <= static_cast<uint32_t>(Colours::grey) &&
-                    (h.sections & ~kAllSections) == 0 && grid && h.zero == 0 &&
+                    (h.sections & ~kAllSections) == 0 && grid && h.low_bits <= most_low_bits &&
                     std::isfinite(h.noise) && h.noise >= 0;
   if (!sane || h.bytes != h.bytes_of_all()) return damaged("its first bytes make no sense");
   if (h.bytes != all)
@@ -145,6 +147,7 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
   Header header;
   header.width = static_cast<uint32_t>(learnt.width);
   header.height = static_cast<uint32_t>(learnt.height);
+  header.low_bits = static_cast<uint32_t>(learnt.low_bits);
   if (!learnt.limits.empty()) header.sections |= kHasLimits;
   if (learnt.earlier) {
     header.sections |= kHasEarlier;
@@ -156,7 +159,7 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
   writer.put_plane(kMagic);
   for (uint32_t number :
        {kLearntVersion, header.width, header.height, static_cast<uint32_t>(learnt.colours),
-        header.sections, header.rows, header.cols, uint32_t{0}})
+        header.sections, header.rows, header.cols, header.low_bits})
     writer.put(number);
   writer.put(std::bit_cast<uint64_t>(learnt.noise));
   writer.put(bytes);
@@ -168,6 +171,7 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
     writer.put_numbers(learnt.earlier->weight);
     writer.put_numbers(learnt.earlier->limit);
   }
+  for (const auto& low : learnt.low) writer.put_plane(low);
   writer.put(checksum(writer.bytes()));
   return writer.take();
 }
@@ -203,6 +207,13 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
     earlier.limit = reader.numbers(cells);
     if (!are_weights(earlier.weight) || !are_weights(earlier.limit))
       return damaged("it has numbers that are none");
+  }
+  read.low_bits = static_cast<int>(header.low_bits);
+  for (auto& low : read.low) {
+    low = reader.plane(read.low_bits > 0 ? pixels : 0);
+    const auto fits = [&](uint8_t digit) { return digit >> read.low_bits == 0; };
+    if (!std::all_of(low.begin(), low.end(), fits))
+      return damaged("it has more bits in a sample than it says");
   }
   *learnt = std::move(read);
   return {};

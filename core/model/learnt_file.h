@@ -13,13 +13,14 @@ namespace qdmd {
 
 // All numbers have their lowest byte first; floats are as in IEEE 754.
 //   magic, 8 bytes; u32 version; u32 width, height; u32 colours; u32 sections, a bit for each of
-//   those that may be missing; u32 rows, columns of the grid, or 0; u32 0; f64 noise; u64 bytes of
-//   the file
-//   the picture's three planes; [limits]; [earlier: three planes, spread; f32 weights, limits]
+//   those that may be missing; u32 rows, columns of the grid, or 0; u32 bits of samples below the
+//   highest eight, 0 to 8; f64 noise; u64 bytes of the file
+//   the picture's three planes; [limits]; [earlier: three planes, spread; f32 weights, limits];
+//   [the bits below the picture's, if there are any: three planes]
 //   u64 FNV-1a of all bytes before it
-// A file of another version is refused. If you change what a file holds, or the grid, count this
-// up.
-constexpr uint32_t kLearntVersion = 1;
+// Version 1 has none of these bits and is read, too; a file of another version is refused. If you
+// change what a file holds, or the grid, count this up.
+constexpr uint32_t kLearntVersion = 2;
 constexpr size_t kLearntHeaderBytes = 56;
 
 // `learnt` is whole: as Engine::learnt() made it, or unpack().

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/passes/digits.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/resample.cpp"
 #include "core/passes/simd.h"
@@ -56,16 +58,18 @@ HWY_INLINE Vector weight_of(Vector way) {
   return hn::IfThenElse(hn::Lt(t, hn::Set(d, 1.0f)), near, beyond);
 }
 
-HWY_INLINE Vector load_levels(const uint8_t* from) {
+template <typename T>
+HWY_INLINE Vector load_samples(const T* from) {
   const Floats d;
   const hn::Rebind<int32_t, Floats> d32;
-  const hn::Rebind<uint8_t, Floats> d8;
-  return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, from)));
+  const hn::Rebind<T, Floats> samples;
+  return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(samples, from)));
 }
 
 // to[i] is at place + i * step of a row whose samples begin at `row`: place is counted from there.
 // Whole vectors; of kTogether neighbours none is two samples further apart than they.
-void along_row(const uint8_t* row, float place, float step, int count, float* to) {
+template <typename T>
+HWY_INLINE void along(const T* row, float place, float step, int count, float* to) {
   const Floats d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   if (step == 1) {
@@ -73,10 +77,11 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
     Vector weight[kTaps];
     for (int k = 0; k < kTaps; ++k)
       weight[k] = weight_of(hn::Set(d, place - whole + kBefore - static_cast<float>(k)));
-    const uint8_t* from = row + static_cast<int>(whole) - kBefore;
+    const T* from = row + static_cast<int>(whole) - kBefore;
     for (int i = 0; i < count; i += lanes, from += lanes) {
-      auto sum = hn::Mul(weight[0], load_levels(from));
-      for (int k = 1; k < kTaps; ++k) sum = hn::Add(sum, hn::Mul(weight[k], load_levels(from + k)));
+      auto sum = hn::Mul(weight[0], load_samples(from));
+      for (int k = 1; k < kTaps; ++k)
+        sum = hn::Add(sum, hn::Mul(weight[k], load_samples(from + k)));
       hn::StoreU(sum, d, to + i);
     }
     return;
@@ -87,7 +92,7 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
     // They are read from samples that are side by side: where places are further apart or nearer
     // than these, the way to them grows.
     const float whole = std::floor(std::min(at, at + last - static_cast<float>(kTogether - 1)));
-    const uint8_t* const from = row + static_cast<int>(whole) - kBefore;
+    const T* const from = row + static_cast<int>(whole) - kBefore;
     const auto start = hn::Set(d, at - whole + kBefore), steps = hn::Set(d, step);
     for (int i = 0; i < std::min(kTogether, count - first); i += lanes) {
       const auto lane = hn::Iota(d, static_cast<float>(i));
@@ -95,25 +100,34 @@ void along_row(const uint8_t* row, float place, float step, int count, float* to
       auto sum = hn::Zero(d);
       for (int k = 0; k <= kTaps; ++k)
         sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
-                                   load_levels(from + i + k)));
+                                   load_samples(from + i + k)));
       hn::StoreU(sum, d, to + first + i);
     }
   }
 }
 
-HWY_INLINE void store_levels(Vector sum, uint8_t* to) {
+void along_row(const uint8_t* row, float place, float step, int count, float* to) {
+  along(row, place, step, count, to);
+}
+void along_deep_row(const uint16_t* row, float place, float step, int count, float* to) {
+  along(row, place, step, count, to);
+}
+
+template <typename T>
+HWY_INLINE void store_samples(Vector sum, float most, T* to) {
   const Floats d;
   const hn::Rebind<int32_t, Floats> d32;
-  const hn::Rebind<uint8_t, Floats> d8;
-  const auto level = hn::Min(hn::Max(sum, hn::Zero(d)), hn::Set(d, 255.0f));
-  const auto whole = hn::ConvertTo(d32, hn::Add(level, hn::Set(d, 0.5f)));
-  hn::StoreU(hn::DemoteTo(d8, whole), d8, to);
+  const hn::Rebind<T, Floats> samples;
+  const auto sample = hn::Min(hn::Max(sum, hn::Zero(d)), hn::Set(d, most));
+  const auto whole = hn::ConvertTo(d32, hn::Add(sample, hn::Set(d, 0.5f)));
+  hn::StoreU(hn::DemoteTo(samples, whole), samples, to);
 }
 
 // to[i] is at place + i * step of column i, whose samples are `stride` apart; place is counted from
-// the first row. Whole vectors.
-void along_columns(const float* columns, size_t stride, float place, float step, int count,
-                   uint8_t* to) {
+// the first row. most: the largest sample. Whole vectors.
+template <typename T>
+HWY_INLINE void down(const float* columns, size_t stride, float place, float step, int count,
+                     float most, T* to) {
   const Floats d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   if (step == 0) {
@@ -128,7 +142,7 @@ void along_columns(const float* columns, size_t stride, float place, float step,
       auto sum = hn::Mul(weight[0], hn::LoadU(d, from));
       for (int k = 1; k < kTaps; ++k)
         sum = hn::Add(sum, hn::Mul(weight[k], hn::LoadU(d, from += stride)));
-      store_levels(sum, to + i);
+      store_samples(sum, most, to + i);
     }
     return;
   }
@@ -147,9 +161,18 @@ void along_columns(const float* columns, size_t stride, float place, float step,
       for (int k = 0; k <= kTaps; ++k, from += stride)
         sum = hn::Add(sum, hn::Mul(weight_of(hn::Sub(way, hn::Set(d, static_cast<float>(k)))),
                                    hn::LoadU(d, from)));
-      store_levels(sum, to + first + i);
+      store_samples(sum, most, to + first + i);
     }
   }
+}
+
+void along_columns(const float* columns, size_t stride, float place, float step, int count,
+                   uint8_t* to) {
+  down(columns, stride, place, step, count, 255, to);
+}
+void along_deep_columns(const float* columns, size_t stride, float place, float step, int count,
+                        float most, uint16_t* to) {
+  down(columns, stride, place, step, count, most, to);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -161,7 +184,9 @@ namespace qdmd {
 namespace {
 
 HWY_EXPORT(along_row);
+HWY_EXPORT(along_deep_row);
 HWY_EXPORT(along_columns);
+HWY_EXPORT(along_deep_columns);
 
 // Of a row's numbers 0 .. count - 1, those for which low <= start + i * step <= high, are one run.
 struct Run {
@@ -186,25 +211,100 @@ Run run_within(float start, float step, float low, float high, int count) {
 
 }  // namespace
 
-ResampleRoom::ResampleRoom()
-    : columns_(static_cast<size_t>(kTileRows) * (kTileWidth + 16)), row_(kTileWidth + 2 * kSlack) {}
+// What differs between samples of 8 bits and deeper ones: T, and where they lie.
+template <typename T>
+class Tiles {
+ public:
+  Tiles(const Resampling& task, ResampleRoom* room);
+  // All tiles of so many rows.
+  void make(int first_row, int row_count);
 
-void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room) {
-  const Places& at = task.places;
-  constexpr size_t kStride = kTileWidth + 16;
-  float* const columns = room->columns_.data();
-  uint8_t* const padded = room->row_.data();
-  alignas(64) uint8_t made[kTileWidth + 16];
-  const auto right = static_cast<float>(task.from_width - 1),
-             low = static_cast<float>(task.from_height - 1);
+ private:
+  // Row v of the picture from column `from` on into padded_, outside of it as it ends.
+  void read_row(int v, int from);
+  void along_row(float place, float step, int count, float* to) const;
+  void along_columns(const float* columns, float place, float step, int count);
+  void write(ptrdiff_t at, size_t count);
+
+  static constexpr size_t kStride = kTileWidth + 16;
+  static constexpr int kLength = kTileWidth + 2 * kSlack;
+  const Resampling& task_;
+  float* columns_;
+  T* padded_;
+  alignas(64) T made_[kStride];
+};
+
+template <>
+Tiles<uint8_t>::Tiles(const Resampling& task, ResampleRoom* room)
+    : task_(task), columns_(room->columns_.data()), padded_(room->row_.data()) {}
+template <>
+Tiles<uint16_t>::Tiles(const Resampling& task, ResampleRoom* room)
+    : task_(task), columns_(room->columns_.data()), padded_(room->deep_row_.data()) {}
+
+template <>
+void Tiles<uint8_t>::along_row(float place, float step, int count, float* to) const {
+  HWY_DYNAMIC_DISPATCH(along_row)(padded_, place, step, count, to);
+}
+template <>
+void Tiles<uint16_t>::along_row(float place, float step, int count, float* to) const {
+  HWY_DYNAMIC_DISPATCH(along_deep_row)(padded_, place, step, count, to);
+}
+
+template <>
+void Tiles<uint8_t>::along_columns(const float* columns, float place, float step, int count) {
+  HWY_DYNAMIC_DISPATCH(along_columns)(columns, kStride, place, step, count, made_);
+}
+template <>
+void Tiles<uint16_t>::along_columns(const float* columns, float place, float step, int count) {
+  const auto most = static_cast<float>((256 << task_.low_bits) - 1);
+  HWY_DYNAMIC_DISPATCH(along_deep_columns)(columns, kStride, place, step, count, most, made_);
+}
+
+template <>
+void Tiles<uint8_t>::write(ptrdiff_t at, size_t count) {
+  std::memcpy(task_.to + at, made_, count);
+}
+template <>
+void Tiles<uint16_t>::write(ptrdiff_t at, size_t count) {
+  split_digits(reinterpret_cast<const uint8_t*>(made_), sizeof(uint16_t), {8 + task_.low_bits, 0},
+               count, task_.to + at, task_.to_low + at);
+}
+
+template <typename T>
+void Tiles<T>::read_row(int v, int from) {
+  const ptrdiff_t start =
+      static_cast<ptrdiff_t>(std::clamp(v, 0, task_.from_height - 1)) * task_.from_width;
+  const int inside = std::clamp(-from, 0, kLength),
+            behind = std::clamp(task_.from_width - from, inside, kLength);
+  const auto read = [&](ptrdiff_t column, int count, T* to) {
+    const uint8_t* const high = task_.from + start + column;
+    if constexpr (sizeof(T) == 1)
+      std::memcpy(to, high, static_cast<size_t>(count));
+    else
+      join_digits(high, task_.from_low + start + column, task_.low_bits, static_cast<size_t>(count),
+                  to);
+  };
+  T ends[2];
+  read(0, 1, &ends[0]);
+  read(task_.from_width - 1, 1, &ends[1]);
+  std::fill_n(padded_, inside, ends[0]);
+  if (behind > inside) read(from + inside, behind - inside, padded_ + inside);
+  std::fill_n(padded_ + behind, kLength - behind, ends[1]);
+}
+
+template <typename T>
+void Tiles<T>::make(int first_row, int row_count) {
+  const Places& at = task_.places;
+  const auto right = static_cast<float>(task_.from_width - 1),
+             low = static_cast<float>(task_.from_height - 1);
   // Along a row of the picture, output columns are so many of its samples apart.
   const float step = at.xx - at.xy * at.yx / at.yy;
   // The same tiles for any bands: sums of floats are rounded where they begin.
   for (int top = first_row / kTileHeight * kTileHeight; top < first_row + row_count;
        top += kTileHeight) {
-    const int rows = std::min(kTileHeight, task.height - top);
-    for (int left = 0; left < task.width; left += kTileWidth) {
-      const int cols = std::min(kTileWidth, task.width - left);
+    const int rows = std::min(kTileHeight, task_.height - top);
+    for (int left = 0; left < task_.width; left += kTileWidth) {
+      const int cols = std::min(kTileWidth, task_.width - left);
       const auto y_of = [&](int x, int y) {
         return at.y0 + at.yx * static_cast<float>(x) + at.yy * static_cast<float>(y);
       };
@@ -222,19 +322,9 @@ void resample(const Resampling& task, int first_row, int row_count, ResampleRoom
         const float y = (row - at.y0 - at.yx * static_cast<float>(left)) / at.yy;
         const float x = at.x0 + at.xx * static_cast<float>(left) + at.xy * y;
         const int from = static_cast<int>(std::floor(x)) - kSlack / 2;
-        const uint8_t* const source =
-            task.from +
-            static_cast<ptrdiff_t>(std::clamp(v, 0, task.from_height - 1)) * task.from_width;
-        const int length = kTileWidth + 2 * kSlack;
-        const int inside = std::clamp(-from, 0, length),
-                  behind = std::clamp(task.from_width - from, inside, length);
-        std::memset(padded, source[0], static_cast<size_t>(inside));
-        std::memcpy(padded + inside, source + from + inside, static_cast<size_t>(behind - inside));
-        std::memset(padded + behind, source[task.from_width - 1],
-                    static_cast<size_t>(length - behind));
-        HWY_DYNAMIC_DISPATCH(along_row)
-        (padded, x - static_cast<float>(from), step, cols,
-         columns + static_cast<size_t>(v - first) * kStride);
+        read_row(v, from);
+        along_row(x - static_cast<float>(from), step, cols,
+                  columns_ + static_cast<size_t>(v - first) * kStride);
       }
       const int stop_row = std::min(top + rows, first_row + row_count);
       for (int y = std::max(top, first_row); y < stop_row; ++y) {
@@ -245,15 +335,26 @@ void resample(const Resampling& task, int first_row, int row_count, ResampleRoom
         const Run down = run_within(y_start, at.yx, 0, low, cols);
         const int begin = std::max(across.begin, down.begin), stop = std::min(across.end, down.end);
         if (begin >= stop) continue;
-        HWY_DYNAMIC_DISPATCH(along_columns)
-        (columns + begin, kStride,
-         y_start + at.yx * static_cast<float>(begin) - static_cast<float>(first), at.yx,
-         stop - begin, made);
-        std::memcpy(task.to + static_cast<ptrdiff_t>(y) * task.width + left + begin, made,
-                    static_cast<size_t>(stop - begin));
+        along_columns(columns_ + begin,
+                      y_start + at.yx * static_cast<float>(begin) - static_cast<float>(first),
+                      at.yx, stop - begin);
+        write(static_cast<ptrdiff_t>(y) * task_.width + left + begin,
+              static_cast<size_t>(stop - begin));
       }
     }
   }
+}
+
+ResampleRoom::ResampleRoom()
+    : columns_(static_cast<size_t>(kTileRows) * (kTileWidth + 16)),
+      row_(kTileWidth + 2 * kSlack),
+      deep_row_(row_.size()) {}
+
+void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room) {
+  if (task.low_bits > 0)
+    Tiles<uint16_t>(task, room).make(first_row, row_count);
+  else
+    Tiles<uint8_t>(task, room).make(first_row, row_count);
 }
 
 }  // namespace qdmd

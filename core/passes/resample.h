@@ -23,9 +23,11 @@ class ResampleRoom {
   ResampleRoom();
 
  private:
-  friend void resample(const struct Resampling&, int, int, ResampleRoom*);
+  template <typename T>
+  friend class Tiles;
   std::vector<float> columns_;
   std::vector<uint8_t> row_;
+  std::vector<uint16_t> deep_row_;
 };
 
 struct Resampling {
@@ -34,10 +36,15 @@ struct Resampling {
   Places places;
   uint8_t* to = nullptr;  // the same
   int width = 0, height = 0;
+  // Of samples of more than 8 bits, whose high digits the planes above have (core/passes/digits.h):
+  // the low digits; else 0 and nulls.
+  int low_bits = 0;
+  const uint8_t* from_low = nullptr;
+  uint8_t* to_low = nullptr;
 };
 
 // Rows first_row .. first_row + row_count - 1 of `to`, by cubic convolution (the six
-// points of Keys 1981), first along rows and then along columns, rounded to whole levels. Output
+// points of Keys 1981), first along rows and then along columns, rounded to whole samples. Output
 // pixels that are outside of the picture stay as they are; next to its border it goes on as it
 // ends. Any threads may write different rows.
 void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room);

@@ -516,7 +516,8 @@ TEST(DeepEngine, OnePixelAndDarkFramesAreOrdinary) {
       }
 }
 
-// What is saved has 8 bits: the middle of what they may have been is the best guess.
+// What is saved has all bits. Where the video has more, the middle of what they may have been is
+// the best guess; where it has fewer, its frames have the highest, and so has the background.
 TEST(DeepEngine, GoesOnWithASavedBackground) {
   std::mt19937 rng(37);
   const auto frames = make_frames(12, rng, 0.4);
@@ -536,9 +537,29 @@ TEST(DeepEngine, GoesOnWithASavedBackground) {
   ASSERT_TRUE(second.learn_from(learnt).ok());
   ASSERT_TRUE(second.write_background(picture.view<uint8_t>()));
   const Frame loaded = picture.samples();
-  for (size_t i = 0; i < 3 * kPixels; ++i) {
-    ASSERT_EQ(loaded[i] % 16, 8);
-    ASSERT_NEAR(loaded[i], known[i], 8 + 1);
+  for (size_t i = 0; i < 3 * kPixels; ++i) ASSERT_EQ(loaded[i], known[i]);
+  for (int depth : {8, 10, 16}) {
+    Engine other;
+    DeepPicture deep({depth, 0}, true);
+    ASSERT_TRUE(other.configure(options_of(depth, Method::robust, kFrames), kWidth, kHeight).ok());
+    ASSERT_TRUE(other.learn_from(learnt).ok());
+    std::vector<uint8_t> bytes(4 * kPixels);
+    BasicImageView<uint8_t> out = deep.view<uint8_t>();
+    if (depth == 8) {
+      out.pixel_stride = 4, out.row_stride = 4 * kWidth;
+      for (size_t c = 0; c < 3; ++c) out.channel[c] = bytes.data() + c;
+      out.alpha = nullptr;
+    }
+    ASSERT_TRUE(other.write_background(out));
+    const Frame shown = depth > 8 ? deep.samples() : Frame();
+    for (size_t i = 0; i < 3 * kPixels; ++i) {
+      if (depth == 8)
+        ASSERT_EQ(bytes[4 * (i % kPixels) + i / kPixels], known[i] >> 4) << i;
+      else if (depth == 10)
+        ASSERT_NEAR(shown[i], known[i] / 4.0, 0.5) << i;
+      else
+        ASSERT_EQ(shown[i], 16 * known[i] + 8) << i;
+    }
   }
 }
 

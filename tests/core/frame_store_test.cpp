@@ -170,30 +170,36 @@ TEST(DeepFrameStore, HasBothDigitsOfEverything) {
   }
 }
 
-// What is moved has 8 bits, and what came keeps all; at rest again it is as it came.
+// What came keeps all bits, and so has what is moved: by whole pixels it is the same samples, and
+// outside of the frame those of the frame before. At rest again it is as it came.
 TEST(DeepFrameStore, KeepsWhatCameOfFramesThatAreMoved) {
   std::mt19937 rng(406);
   const FrameContents contents = {1, 0, 1, 1, DeepFrame::kBits.low()};
   FrameStore store(2, kWidth, kHeight, contents);
   const DeepFrame frame(rng, false);
+  const DeepFrame before(rng, false);
+  ASSERT_TRUE(store.append(before.view()));
   ASSERT_TRUE(store.append(frame.view()));
   Pool pool(1);
   Resampler resampler;
   Pose pose;
   pose.x = 3;
-  ASSERT_TRUE(store.steady(0, pose, &resampler, &pool));
-  const int slot = store.slot(0);
+  ASSERT_TRUE(store.steady(1, pose, &resampler, &pool));
+  const int slot = store.slot(1);
+  const SnapshotRange moved = store.whole(store.window());
   for (int c = 0; c < kChannels; ++c)
-    for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p) {
-      ASSERT_EQ(store.untouched(slot, c)[p] << 4 | store.untouched_low(slot, c)[p],
-                frame.sample(c, p));
-      ASSERT_EQ(store.low_picture(slot).plane[c][p], 8);
-    }
-  ASSERT_TRUE(store.steady(0, Pose(), &resampler, &pool));
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const auto p = static_cast<size_t>(y * kWidth + x);
+        ASSERT_EQ(store.untouched(slot, c)[p] << 4 | store.untouched_low(slot, c)[p],
+                  frame.sample(c, p));
+        ASSERT_EQ(moved.sample(1, c, p), x < 3 ? before.sample(c, p) : frame.sample(c, p - 3));
+      }
+  ASSERT_TRUE(store.steady(1, Pose(), &resampler, &pool));
   const SnapshotRange whole = store.whole(store.window());
   for (int c = 0; c < kChannels; ++c)
     for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p)
-      ASSERT_EQ(whole.sample(0, c, p), frame.sample(c, p));
+      ASSERT_EQ(whole.sample(1, c, p), frame.sample(c, p));
 }
 
 // The engine counts it, too, and says what to change.

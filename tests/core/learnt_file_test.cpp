@@ -10,7 +10,7 @@
 namespace qdmd::test {
 namespace {
 
-Learnt small(bool limits, bool earlier) {
+Learnt small(bool limits, bool earlier, int low_bits = 0) {
   Learnt learnt;
   learnt.width = 5;
   learnt.height = 3;
@@ -32,6 +32,12 @@ Learnt small(bool limits, bool earlier) {
     e.cols = 3;
     e.weight = {0, 1.5f, 2, 3e6f, 4, 0.001f};
     e.limit = {6, 7, 8, 9, 10, 11};
+  }
+  learnt.low_bits = low_bits;
+  for (auto& low : learnt.low) {
+    if (low_bits == 0) continue;
+    low = plane();
+    for (uint8_t& digit : low) digit = static_cast<uint8_t>(digit >> (8 - low_bits));
   }
   return learnt;
 }
@@ -63,6 +69,8 @@ void expect_equal(const Learnt& a, const Learnt& b) {
   EXPECT_EQ(a.height, b.height);
   EXPECT_EQ(a.colours, b.colours);
   for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.level[c], b.level[c]);
+  EXPECT_EQ(a.low_bits, b.low_bits);
+  for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.low[c], b.low[c]);
   EXPECT_EQ(a.limits, b.limits);
   EXPECT_EQ(a.noise, b.noise);
   ASSERT_EQ(a.earlier.has_value(), b.earlier.has_value());
@@ -93,24 +101,50 @@ void sign(std::vector<uint8_t>* bytes) {
 
 TEST(LearntFile, RoundTrip) {
   for (bool limits : {false, true})
-    for (bool earlier : {false, true}) {
-      const Learnt learnt = small(limits, earlier);
-      const auto bytes = pack(learnt);
-      const auto header = std::span(bytes).first(kLearntHeaderBytes);
-      EXPECT_TRUE(check_header(header, bytes.size()).ok());
-      EXPECT_FALSE(check_header(header, bytes.size() + 1).ok());
-      Learnt read;
-      const Status status = unpack(bytes, &read);
-      ASSERT_TRUE(status.ok()) << status.message;
-      expect_equal(learnt, read);
-      EXPECT_EQ(bytes, pack(read));
-    }
+    for (bool earlier : {false, true})
+      for (int low_bits : {0, 2, 8}) {
+        const Learnt learnt = small(limits, earlier, low_bits);
+        const auto bytes = pack(learnt);
+        const auto header = std::span(bytes).first(kLearntHeaderBytes);
+        EXPECT_TRUE(check_header(header, bytes.size()).ok());
+        EXPECT_FALSE(check_header(header, bytes.size() + 1).ok());
+        Learnt read;
+        const Status status = unpack(bytes, &read);
+        ASSERT_TRUE(status.ok()) << status.message;
+        expect_equal(learnt, read);
+        EXPECT_EQ(bytes, pack(read));
+      }
+}
+
+// Files that an earlier version has saved are read.
+TEST(LearntFile, TheVersionBeforeIsRead) {
+  const Learnt learnt = small(true, true);
+  auto bytes = pack(learnt);
+  ASSERT_EQ(bytes[8], 2);
+  bytes[8] = 1;
+  sign(&bytes);
+  Learnt read;
+  const Status status = unpack(bytes, &read);
+  ASSERT_TRUE(status.ok()) << status.message;
+  expect_equal(learnt, read);
+  // It knew no more than 8 bits.
+  bytes = pack(small(true, true, 2));
+  bytes[8] = 1;
+  sign(&bytes);
+  EXPECT_FALSE(unpack_it(bytes).ok());
+}
+
+TEST(LearntFile, DigitsThatAreTooLargeAreSeen) {
+  Learnt learnt = small(false, false, 2);
+  EXPECT_TRUE(unpack_it(pack(learnt)).ok());
+  learnt.low[1][7] = 4;
+  EXPECT_FALSE(unpack_it(pack(learnt)).ok());
 }
 
 TEST(LearntFile, TheBytesAreTheseOnEveryMachine) {
   const auto bytes = pack(small(false, false));
   const std::vector<uint8_t> header = {
-      0x89, 'Q', 'D', 'M', 'D', '\r', '\n', 0x1a, 1,    0,    0,   0, 5, 0, 0, 0, 3, 0, 0,
+      0x89, 'Q', 'D', 'M', 'D', '\r', '\n', 0x1a, 2,    0,    0,   0, 5, 0, 0, 0, 3, 0, 0,
       0,    1,   0,   0,   0,   0,    0,    0,    0,    0,    0,   0, 0, 0, 0, 0, 0, 0, 0,
       0,    0,   0,   0,   0,   0,    0,    0,    0xf4, 0x3f, 109, 0, 0, 0, 0, 0, 0, 0};
   ASSERT_EQ(kLearntHeaderBytes, header.size());
@@ -120,7 +154,7 @@ TEST(LearntFile, TheBytesAreTheseOnEveryMachine) {
 
 TEST(LearntFile, EveryDamageIsSeen) {
   for (bool sections : {false, true}) {
-    const auto whole = pack(small(sections, sections));
+    const auto whole = pack(small(sections, sections, sections ? 2 : 0));
     for (size_t at = 0; at < whole.size(); ++at)
       for (int bit = 0; bit < 8; ++bit) {
         auto bytes = whole;

@@ -63,6 +63,8 @@ TEST_P(PartsMemory, OfAPicture) {
   expect("LightScratch", LightScratch::bytes(grid.cells()),
          [&] { LightScratch part(grid.cells()); });
   expect("Restorer", Restorer::bytes(width, height), [&] { Restorer part(width, height); });
+  expect("Restorer of more than 8 bits", Restorer::bytes(width, height, true),
+         [&] { Restorer part(width, height, 2); });
   expect("PixelNoise", PixelNoise::bytes(width, height), [&] { PixelNoise part(width, height); });
   expect("SoftMask", SoftMask::bytes(width, height), [&] { SoftMask part(width, height); });
   expect("Specks", Specks::bytes(width, height), [&] { Specks part(width, height); });

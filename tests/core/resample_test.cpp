@@ -21,12 +21,15 @@ double weight(double way) {
 struct Case {
   int width, height;
   Places places;
+  int low_bits = 0;  // of samples, below their highest eight
+
+  int most() const { return (256 << low_bits) - 1; }
 };
 
-constexpr uint8_t kOutside = 99;
+constexpr uint8_t kOutside = 99, kLowOutside = 1;
 
 // First along rows, at the row's own places, and then along columns.
-double plain(const Case& at, const std::vector<uint8_t>& from, int x, int y, bool* inside,
+double plain(const Case& at, const std::vector<int>& from, int x, int y, bool* inside,
              bool* border) {
   const Places& p = at.places;
   const double u = p.x0 + double{p.xx} * x + double{p.xy} * y;
@@ -48,22 +51,32 @@ double plain(const Case& at, const std::vector<uint8_t>& from, int x, int y, boo
                                             static_cast<size_t>(std::clamp(col, 0, at.width - 1))];
     sum += weight(v - row) * of_row;
   }
-  return std::clamp(sum, 0.0, 255.0);
+  return std::clamp(sum, 0.0, double(at.most()));
 }
 
 void expect_plain(const Case& at) {
   const auto pixels = static_cast<size_t>(at.width) * static_cast<size_t>(at.height);
   std::mt19937 rng(5);
-  BeforeTheEdge<uint8_t> from(pixels), to(pixels);
-  for (uint8_t& sample : from) sample = static_cast<uint8_t>(rng() >> 13);
+  BeforeTheEdge<uint8_t> from(pixels), to(pixels), from_low(pixels), to_low(pixels);
+  std::vector<int> samples(pixels);
+  for (size_t p = 0; p < pixels; ++p) {
+    samples[p] = static_cast<int>(rng() >> 13) & at.most();
+    from.data()[p] = static_cast<uint8_t>(samples[p] >> at.low_bits);
+    from_low.data()[p] = static_cast<uint8_t>(samples[p] & ((1 << at.low_bits) - 1));
+  }
   std::fill(to.begin(), to.end(), kOutside);
-  const std::vector<uint8_t> copy(from.begin(), from.end());
+  std::fill(to_low.begin(), to_low.end(), kLowOutside);
   Resampling task;
   task.from = from.data();
   task.from_width = task.width = at.width;
   task.from_height = task.height = at.height;
   task.places = at.places;
   task.to = to.data();
+  if (at.low_bits > 0) {
+    task.low_bits = at.low_bits;
+    task.from_low = from_low.data();
+    task.to_low = to_low.data();
+  }
   ResampleRoom room;
   // In bands, as threads do.
   for (int first = 0; first < at.height; first += 37)
@@ -71,18 +84,20 @@ void expect_plain(const Case& at) {
   for (int y = 0; y < at.height; ++y)
     for (int x = 0; x < at.width; ++x) {
       bool inside, border;
-      const double expected = plain(at, copy, x, y, &inside, &border);
+      const double expected = plain(at, samples, x, y, &inside, &border);
       if (border) continue;
-      const double got =
-          to[static_cast<size_t>(y) * static_cast<size_t>(at.width) + static_cast<size_t>(x)];
-      // Half a level to round, and places in float: 2000 pixels times the epsilon, times a slope of
+      const size_t p =
+          static_cast<size_t>(y) * static_cast<size_t>(at.width) + static_cast<size_t>(x);
+      const int got = to.data()[p] << at.low_bits | (at.low_bits > 0 ? to_low.data()[p] : 0);
+      const int outside = kOutside << at.low_bits | (at.low_bits > 0 ? kLowOutside : 0);
+      // Half a unit to round, and places in float: 2000 pixels times the epsilon, times a slope of
       // two pictures' range.
-      const double bound = 0.5 + 2000 * 1.2e-7 * 4 * 512;
+      const double bound = 0.5 + 2000 * 1.2e-7 * 4 * 2 * (at.most() + 1);
       if (inside)
         ASSERT_NEAR(got, expected, bound)
             << at.width << "x" << at.height << " at " << x << ", " << y;
       else
-        ASSERT_EQ(got, kOutside) << at.width << "x" << at.height << " at " << x << ", " << y;
+        ASSERT_EQ(got, outside) << at.width << "x" << at.height << " at " << x << ", " << y;
     }
 }
 
@@ -95,7 +110,7 @@ TEST(Resample, IsTheConvolutionWhereverItFalls) {
             Places{1, 0, 3, 0, 1, -2}, Places{0.9994f, -0.0349f, 6.3f, 0.0349f, 0.9994f, -9.1f},
             Places{1.01f, 0.0175f, -3.2f, -0.0175f, 1.01f, 4.6f},
             Places{0.98f, -0.05f, 0.3f, 0.05f, 0.98f, 0.1f}})
-        expect_plain({width, height, places});
+        for (int low_bits : {0, 2, 8}) expect_plain({width, height, places, low_bits});
   });
 }
 
@@ -106,8 +121,15 @@ TEST(Resample, AtRestIsTheSamePicture) {
     for (uint8_t& sample : from) sample = static_cast<uint8_t>(rng() >> 13);
     Resampler resampler;
     resampler.prepare(nullptr);
-    resampler.run(from.data(), affine(Pose(), middle_of(301, 77)), to.data(), 301, 77, nullptr);
+    const Affine rest = affine(Pose(), middle_of(301, 77));
+    resampler.run(from.data(), rest, to.data(), 301, 77, nullptr);
     EXPECT_EQ(from, to);
+    const std::vector<uint8_t> low(from.rbegin(), from.rend());
+    std::vector<uint8_t> deep(from.size(), kOutside), deep_low(deep);
+    resampler.run_deep(from.data(), low.data(), 8, rest, deep.data(), deep_low.data(), 301, 77,
+                       nullptr);
+    EXPECT_EQ(from, deep);
+    EXPECT_EQ(low, deep_low);
   });
 }
 

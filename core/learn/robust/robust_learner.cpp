@@ -125,7 +125,9 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       static_cast<uint64_t>(window_size) * sizeof(Gain);
   // A scene that was left: levels and limits, and the same once more for windows to come. Where it
   // is back, there are two for a moment.
-  const uint64_t scene = models == Models::two_of_live ? pixels() * (2 * kChannels + 2) : 0;
+  const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
+  const uint64_t scene =
+      models == Models::two_of_live ? pixels() * ((1 + digits) * kChannels + 2) : 0;
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
