@@ -81,6 +81,26 @@ class GridPictures {
   std::vector<const float*> of_;
 };
 
+// The picture that takes each cell from the frame from[cell] of others.
+class GridPicture {
+ public:
+  GridPicture(const GridPictures& frames, const std::vector<int>& from) : cells_(from.size()) {
+    levels_.resize(kChannels * cells_);
+    for (size_t cell = 0; cell < cells_; ++cell) take(frames, from[cell], cell);
+  }
+  void take(const GridPictures& frames, int frame, size_t cell) {
+    for (int c = 0; c < kChannels; ++c)
+      levels_[static_cast<size_t>(c) * cells_ + cell] = frames.plane(frame, c)[cell];
+  }
+  const float* plane(int channel) const {
+    return levels_.data() + static_cast<size_t>(channel) * cells_;
+  }
+
+ private:
+  size_t cells_;
+  std::vector<float> levels_;
+};
+
 // The mean of each cell of a plane of grid.width * grid.height samples.
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 

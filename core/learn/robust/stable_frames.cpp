@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "core/learn/robust/clutter.h"
 #include "core/learn/robust/contour.h"
 #include "core/passes/patch_density.h"
 
@@ -23,26 +24,6 @@ constexpr int kProposals = 64;
 // nearest twentieth, or as half the distance at which patches are alike.
 constexpr float kNear = 3.5f;
 constexpr double kNearest = 0.05;
-
-// The picture that takes each cell from the frame `from`.
-class GridPicture {
- public:
-  GridPicture(const GridPictures& frames, const std::vector<int>& from) : cells_(from.size()) {
-    levels_.resize(kChannels * cells_);
-    for (size_t cell = 0; cell < cells_; ++cell) take(frames, from[cell], cell);
-  }
-  void take(const GridPictures& frames, int frame, size_t cell) {
-    for (int c = 0; c < kChannels; ++c)
-      levels_[static_cast<size_t>(c) * cells_ + cell] = frames.plane(frame, c)[cell];
-  }
-  const float* plane(int channel) const {
-    return levels_.data() + static_cast<size_t>(channel) * cells_;
-  }
-
- private:
-  size_t cells_;
-  std::vector<float> levels_;
-};
 
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
@@ -144,6 +125,19 @@ std::vector<int> densest(std::span<const float> density, size_t cells, Pool* poo
   return from;
 }
 
+// What hides most of the picture is recognized by its colours; with a better background these are
+// known better.
+void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
+                       std::span<const float> density, std::vector<int>* from, Pool* pool) {
+  constexpr int kRounds = 3;
+  ClutterColours colours(grid, frames, count, pool);
+  if (!colours.hides_much(*from)) return;
+  for (int round = 0; round < kRounds; ++round) {
+    colours.learn(*from);
+    *from = densest(colours.weigh(density), grid.cells(), pool);
+  }
+}
+
 // How far a frame that shows the background may be: distance, of all frames less one. scratch: as
 // many.
 float limit_of(std::span<const float> distance, size_t left_out, std::span<float> scratch) {
@@ -192,6 +186,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
       for (size_t cell = 0; cell < cells; ++cell)
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
   std::vector<int> from = densest(density, cells, pool);
+  leave_clutter_out(grid, frames, count, density, &from, pool);
   compare_contours(grid, frames, count, density, &from);
 
   densities.reset();
@@ -232,8 +227,10 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
 
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads) {
   const uint64_t rooms = sizeof(float) * static_cast<uint64_t>(threads) * grid.cells();
-  return std::max(sizeof(float) * looks * grid.cells() + PatchFrames::bytes(grid, looks) + rooms,
-                  patch_distance_bytes(grid, looks));
+  const uint64_t densities = sizeof(float) * looks * grid.cells();
+  return std::max({densities + PatchFrames::bytes(grid, looks) + rooms,
+                   densities + ClutterColours::bytes(grid, looks, threads),
+                   patch_distance_bytes(grid, looks)});
 }
 
 }  // namespace qdmd

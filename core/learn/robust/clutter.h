@@ -1,0 +1,48 @@
+// What moves before most of the picture has colours of its own.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/parallel/pool.h"
+#include "core/passes/grid.h"
+
+namespace qdmd {
+
+// Leaves near the camera may rest before a place for so long that most frames show them there. But
+// elsewhere they move, and the background is known: a look with the colours of what moves is
+// unlikely to be background. Colours are those of cells, 8 steps a channel, whatever the channels
+// are.
+class ClutterColours {
+ public:
+  // frames: looks of the cells, of which the first `count` are a window's; they stay where they
+  // are.
+  ClutterColours(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
+  static uint64_t bytes(const Grid& grid, uint64_t looks, int threads);
+
+  // True where much of what frames show is unlike the background. from: of each cell the frame
+  // whose look is taken for it.
+  bool hides_much(const std::vector<int>& from) const;
+  // The colours of the background, and of what is unlike it.
+  void learn(const std::vector<int>& from);
+  // The densities times how much likelier the colours of the 5 x 5 cells around are in the
+  // background than in what moves: the geometric mean. Until the next weigh().
+  std::span<const float> weigh(std::span<const float> density);
+
+ private:
+  static constexpr int kSteps = 8, kColours = kSteps * kSteps * kSteps;
+  static int colour_of(const float* const look[3], size_t cell);
+  // Of a look, by cells: logarithms, in two rooms of as many numbers.
+  void find_logarithms(int look, float* room, float* out) const;
+
+  Grid grid_;
+  const GridPictures& frames_;
+  int count_;
+  Pool* pool_;
+  std::array<float, kColours> likelier_;  // logarithms
+  std::vector<float> weighed_, rooms_;    // rooms: for each thread
+};
+
+}  // namespace qdmd
