@@ -32,8 +32,9 @@ constexpr double kMostNoise = 12;
 // Frames of which so much fits tell the noise.
 constexpr double kTypical = 0.6;
 // The share of the landmarks by which a pose must fit better than another one; less where they are
-// nearer than a pixel and kNear.
-constexpr double kClearly = 0.1, kNear = 0.3;
+// nearer than a pixel and kNear. Where they are kFar pixels apart or more, little of what fitted
+// can fit still: leaves near the camera, of which many move alike, leave more.
+constexpr double kClearly = 0.1, kNear = 0.3, kFarClearly = 0.2, kFar = 8;
 // Levels: frames that differ by more from the first reference may have been moved.
 constexpr double kFirstNoise = 4;
 
@@ -204,7 +205,8 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   };
   const auto gain_over = [&](const Pose& pose) {
     const double far = largest_way(fit.pose, pose, full.width, full.height);
-    return std::min(kClearly, kClearly * std::max(0.0, far - kNear));
+    const double at_hand = std::min(kClearly, kClearly * std::max(0.0, far - kNear));
+    return std::clamp(kFarClearly * far / kFar, at_hand, kFarClearly);
   };
   const double there = fits_at(fit.pose, fit.light), here = fits_at(rest, look.light),
                then = fits_at(before, fit.light);

@@ -123,6 +123,16 @@ TEST(Stabilize, ShakingBackgroundsAndMasksAreWhereTheyAre) {
   }
 }
 
+// Leaves near the camera hide most of the picture, and many of them move alike.
+TEST(Stabilize, LeavesBeforeTheSceneAreNoMotion) {
+  for (const char* text : {"foliage", "foliage,noise=2", "foliage:rest=3"}) {
+    const Film leaves = film(text, 150, 320, 240);
+    const Result result =
+        run(leaves, robust(Stabilize::translation, Mode::live), Output::mask, false, 320, 240);
+    EXPECT_EQ(std::count(result.poses.begin(), result.poses.end(), Pose()), 150) << text;
+  }
+}
+
 TEST(Stabilize, EveryMethodGainsByIt) {
   const Film shaken = film("basic,jitter=2:rotation=1", 80);
   for (const Method method : {Method::qdmd, Method::dmd, Method::robust})
