@@ -33,7 +33,8 @@ constexpr double kMostNoise = 12;
 constexpr double kTypical = 0.6;
 // The share of the landmarks by which a pose must fit better than another one; less where they are
 // nearer than a pixel and kNear. Where they are kFar pixels apart or more, little of what fitted
-// can fit still: leaves near the camera, of which many move alike, leave more.
+// can fit still: leaves near the camera, of which many move alike, leave more. The share grows to
+// that from half of kFar on.
 constexpr double kClearly = 0.1, kNear = 0.3, kFarClearly = 0.2, kFar = 8;
 // Levels: frames that differ by more from the first reference may have been moved.
 constexpr double kFirstNoise = 4;
@@ -205,8 +206,8 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
   };
   const auto gain_over = [&](const Pose& pose) {
     const double far = largest_way(fit.pose, pose, full.width, full.height);
-    const double at_hand = std::min(kClearly, kClearly * std::max(0.0, far - kNear));
-    return std::clamp(kFarClearly * far / kFar, at_hand, kFarClearly);
+    if (2 * far < kFar) return std::min(kClearly, kClearly * std::max(0.0, far - kNear));
+    return std::min(kFarClearly, kFarClearly * far / kFar);
   };
   const double there = fits_at(fit.pose, fit.light), here = fits_at(rest, look.light),
                then = fits_at(before, fit.light);

@@ -278,8 +278,8 @@ void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
                                 const std::vector<uint8_t>* limits, size_t pixels) {
   pixels_ = pixels;
   make_pictures(kChannels);
-  // Nobody knows digits that the picture does not have: the middle of what they can be. Video of
-  // fewer bits has the picture's highest ones, as its frames would.
+  // Nobody knows digits that the picture does not have: the middle of what they can be. Video of 8
+  // bits has the picture's highest ones, as its frames would; other video has it rounded.
   const bool deep = std::min(low_bits, low_bits_) > 0;
   const auto unit = 1.0f / static_cast<float>(1 << low_bits);
   const float middle = low_bits_ == 0 ? 0 : deep ? (low_bits_ > low_bits ? unit / 2 : 0) : 0.5f;

@@ -105,7 +105,7 @@ struct Street {
   static constexpr int kCount = 40;
   int corner = grid.cols / 4;
 
-  explicit Street(bool clutter) : frames(grid, kCount) {
+  Street() : frames(grid, kCount) {
     std::mt19937 rng(7);
     std::vector<std::array<float, 3>> green(grid.cells());
     for (int t = 0; t < kCount; ++t) {
@@ -119,8 +119,7 @@ struct Street {
           // Leaves are larger than a patch; those that move are other ones with each frame.
           const auto leaf = static_cast<unsigned>((y + 3 * (rests ? t / 24 * t : t)) / 8 * 7 +
                                                   (x + 5 * (rests ? t / 24 * t : t)) / 8 * 3);
-          const bool hidden =
-              clutter && x < 3 * grid.cols / 4 && (rests && t < 24 ? true : leaf % 3 != 0);
+          const bool hidden = x < 3 * grid.cols / 4 && (rests && t < 24 ? true : leaf % 3 != 0);
           for (int c = 0; c < kChannels; ++c)
             frames.plane(t, c)[cell] =
                 hidden
@@ -137,20 +136,26 @@ struct Street {
   }
 };
 
-TEST(Clutter, IsThereWhereMostIsHidden) {
+// Frames that differ from the first one in a part of their cells.
+TEST(Clutter, IsThereWhereMuchIsHidden) {
   Pool pool(2);
-  for (bool clutter : {false, true}) {
-    const Street street(clutter);
-    const GridPictures pictures(street.frames);
-    const ClutterColours colours(street.grid, pictures, Street::kCount, &pool);
-    EXPECT_EQ(colours.hides_much(std::vector<int>(street.grid.cells(), 0)), clutter);
-  }
+  const Grid grid(160, 120);
+  for (int count : {2, 5, 40})
+    for (double share : {0.2, 0.4}) {
+      GridFrames frames(grid, count + 1);
+      const auto hidden = static_cast<size_t>(share * static_cast<double>(grid.cells()));
+      for (int t = 0; t < count; ++t)
+        for (int c = 0; c < kChannels; ++c) std::fill_n(frames.plane(t, c), hidden, 90.0f);
+      const GridPictures pictures(frames);
+      const ClutterColours colours(grid, pictures, count, &pool);
+      EXPECT_EQ(colours.hides_much(std::vector<int>(grid.cells(), count)), share > 0.3) << count;
+    }
 }
 
 // Of a corner most frames show one look, and it is not the background.
 TEST(Clutter, ThatRestsIsNotTheBackground) {
   Pool pool(2);
-  const Street street(true);
+  const Street street;
   const GridPictures pictures(street.frames);
   const StableFrames found =
       find_stable_frames(street.grid, pictures, Street::kCount, nullptr, &pool);

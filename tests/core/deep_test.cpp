@@ -517,7 +517,7 @@ TEST(DeepEngine, OnePixelAndDarkFramesAreOrdinary) {
 }
 
 // What is saved has all bits. Where the video has more, the middle of what they may have been is
-// the best guess; where it has fewer, its frames have the highest, and so has the background.
+// the best guess; video of 8 bits has the highest ones, as its frames do, other video rounds.
 TEST(DeepEngine, GoesOnWithASavedBackground) {
   std::mt19937 rng(37);
   const auto frames = make_frames(12, rng, 0.4);

@@ -11,6 +11,7 @@
 #include "core/foreground/specks.h"
 #include "core/gram/window.h"
 #include "core/learn/robust/absorbed.h"
+#include "core/learn/robust/clutter.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/scene_watch.h"
 #include "core/learn/robust/standing_looks.h"
@@ -65,6 +66,19 @@ TEST_P(PartsMemory, OfAPicture) {
   expect("Restorer", Restorer::bytes(width, height), [&] { Restorer part(width, height); });
   expect("Restorer of more than 8 bits", Restorer::bytes(width, height, true),
          [&] { Restorer part(width, height, 2); });
+  constexpr int kLooks = 9;
+  const GridFrames frames(grid, kLooks);
+  const GridPictures looks(frames);
+  const std::vector<int> from(grid.cells(), 1);
+  const std::vector<float> density(kLooks * grid.cells(), 1.0f);
+  Pool pool(1);
+  expect("ClutterColours", ClutterColours::bytes(grid, kLooks, 1), [&] {
+    ClutterColours part(grid, looks, kLooks, &pool);
+    for (int round = 0; round < 2; ++round) {
+      part.learn(from);
+      part.weigh(density);
+    }
+  });
   expect("PixelNoise", PixelNoise::bytes(width, height), [&] { PixelNoise part(width, height); });
   expect("SoftMask", SoftMask::bytes(width, height), [&] { SoftMask part(width, height); });
   expect("Specks", Specks::bytes(width, height), [&] { Specks part(width, height); });

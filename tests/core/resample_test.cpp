@@ -90,9 +90,10 @@ void expect_plain(const Case& at) {
           static_cast<size_t>(y) * static_cast<size_t>(at.width) + static_cast<size_t>(x);
       const int got = to.data()[p] << at.low_bits | (at.low_bits > 0 ? to_low.data()[p] : 0);
       const int outside = kOutside << at.low_bits | (at.low_bits > 0 ? kLowOutside : 0);
-      // Half a unit to round, and places in float: 2000 pixels times the epsilon, times a slope of
-      // two pictures' range.
-      const double bound = 0.5 + 2000 * 1.2e-7 * 4 * 2 * (at.most() + 1);
+      // Half a unit to round, and twelve weights and sums in float; but for shifts places in float,
+      // too: 2000 pixels times the epsilon, times a slope of two pictures' range.
+      const double range = at.most() + 1, sums = 24 * 6e-8 * 2 * range;
+      const double bound = 0.5 + sums + (at.places.is_shift() ? 0 : 2000 * 1.2e-7 * 4 * 2 * range);
       if (inside)
         ASSERT_NEAR(got, expected, bound)
             << at.width << "x" << at.height << " at " << x << ", " << y;

@@ -11,7 +11,7 @@ namespace {
 
 // Clutter hides more than this share of the background, as far as that is known.
 constexpr double kClutter = 0.3;
-// Colours that are seldom seen say no more than this, as a logarithm.
+// No colour says more than this, as a logarithm: those that are seldom seen would.
 constexpr double kMostSaid = 3;
 
 // Of cells within kPatchRadius along a line of `count` that are `step` apart: sums.
@@ -43,13 +43,13 @@ int ClutterColours::colour_of(const float* const look[3], size_t cell) {
 }
 
 bool ClutterColours::hides_much(const std::vector<int>& from) const {
-  // Few frames tell, in little time.
-  constexpr int kEvery = 4;
+  // Some frames tell, in little time; of a few, all are looked at.
+  const int every = std::clamp(count_ / 16, 1, 4);
   const size_t cells = grid_.cells();
   const GridPicture picture(frames_, from);
   const float* const background[3] = {picture.plane(0), picture.plane(1), picture.plane(2)};
   size_t unlike = 0, all = 0;
-  for (int t = 0; t < count_; t += kEvery, all += cells) {
+  for (int t = 0; t < count_; t += every, all += cells) {
     const float* const look[3] = {frames_.plane(t, 0), frames_.plane(t, 1), frames_.plane(t, 2)};
     for (size_t cell = 0; cell < cells; ++cell)
       unlike += differs_at(look, background, cell) ? 1 : 0;
@@ -62,24 +62,26 @@ void ClutterColours::learn(const std::vector<int>& from) {
   const GridPicture picture(frames_, from);
   const float* const background[3] = {picture.plane(0), picture.plane(1), picture.plane(2)};
   // How often they are seen, and once more: nobody knows colours that were never seen.
-  std::array<uint32_t, kColours> behind, before;
-  behind.fill(1);
-  before.fill(1);
+  std::array<uint32_t, kColours> of_background, of_clutter;
+  of_background.fill(1);
+  of_clutter.fill(1);
   for (size_t cell = 0; cell < cells; ++cell)
-    behind[static_cast<size_t>(colour_of(background, cell))] += static_cast<uint32_t>(count_);
+    of_background[static_cast<size_t>(colour_of(background, cell))] +=
+        static_cast<uint32_t>(count_);
   uint64_t moves = 0;
   for (int t = 0; t < count_; ++t) {
     const float* const look[3] = {frames_.plane(t, 0), frames_.plane(t, 1), frames_.plane(t, 2)};
     for (size_t cell = 0; cell < cells; ++cell) {
       if (!differs_at(look, background, cell)) continue;
-      ++before[static_cast<size_t>(colour_of(look, cell))];
+      ++of_clutter[static_cast<size_t>(colour_of(look, cell))];
       ++moves;
     }
   }
   const double all = static_cast<double>(cells) * count_;
   const double shares = std::log((static_cast<double>(moves) + kColours) / (all + kColours));
   for (size_t i = 0; i < kColours; ++i) {
-    const double likelier = std::log(static_cast<double>(behind[i]) / before[i]) + shares;
+    const double likelier =
+        std::log(static_cast<double>(of_background[i]) / of_clutter[i]) + shares;
     likelier_[i] = static_cast<float>(std::clamp(likelier, -kMostSaid, kMostSaid));
   }
 }

@@ -1,4 +1,4 @@
-// What moves before most of the picture has colours of its own.
+// What moves in front of most of the picture has colours of its own.
 #pragma once
 
 #include <array>
@@ -11,13 +11,13 @@
 
 namespace qdmd {
 
-// Leaves near the camera may rest before a place for so long that most frames show them there. But
-// elsewhere they move, and the background is known: a look with the colours of what moves is
+// Leaves near the camera may rest in front of a place for so long that most frames show them there.
+// But elsewhere they move, and the background is known: a look with the colours of what moves is
 // unlikely to be background. Colours are those of cells, 8 steps a channel, whatever the channels
 // are.
 class ClutterColours {
  public:
-  // frames: looks of the cells, of which the first `count` are a window's; they stay where they
+  // frames: looks of the cells, of which the first `count` are frames'; they stay where they
   // are.
   ClutterColours(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
   static uint64_t bytes(const Grid& grid, uint64_t looks, int threads);

@@ -186,7 +186,8 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
       for (size_t cell = 0; cell < cells; ++cell)
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
   std::vector<int> from = densest(density, cells, pool);
-  leave_clutter_out(grid, frames, count, density, &from, pool);
+  // What was absorbed is the background of a part of the frames only.
+  if (first_looks.from.empty()) leave_clutter_out(grid, frames, count, density, &from, pool);
   compare_contours(grid, frames, count, density, &from);
 
   densities.reset();

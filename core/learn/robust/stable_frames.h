@@ -77,7 +77,8 @@ struct FirstLooks {
 // frames: `count` pictures in one light, and a further one of the background in earlier windows
 // where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
 // around it that most frames share (the mode of the patches' density), corrected where another
-// frame's region fits its surroundings better: what stands still for long shows by its contour.
+// frame's region fits its surroundings better: what stands still for long shows by its contour. If
+// something hides most of the picture, looks that have its colours count less.
 StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
                                 const FirstLooks& first_looks = {});
