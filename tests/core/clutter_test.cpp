@@ -136,20 +136,26 @@ struct Street {
   }
 };
 
-// Frames that differ from the first one in a part of their cells.
-TEST(Clutter, IsThereWhereMuchIsHidden) {
+// A part of the cells is unlike the background, and either no two frames share what they show
+// there, or half of them do, as where there are two scenes.
+TEST(Clutter, IsThereWhereMuchIsHiddenByWhatMoves) {
   Pool pool(2);
   const Grid grid(160, 120);
-  for (int count : {2, 5, 40})
-    for (double share : {0.2, 0.4}) {
-      GridFrames frames(grid, count + 1);
-      const auto hidden = static_cast<size_t>(share * static_cast<double>(grid.cells()));
-      for (int t = 0; t < count; ++t)
-        for (int c = 0; c < kChannels; ++c) std::fill_n(frames.plane(t, c), hidden, 90.0f);
-      const GridPictures pictures(frames);
-      const ClutterColours colours(grid, pictures, count, &pool);
-      EXPECT_EQ(colours.hides_much(std::vector<int>(grid.cells(), count)), share > 0.3) << count;
-    }
+  for (int count : {5, 40})
+    for (double share : {0.2, 0.4})
+      for (bool moves : {false, true}) {
+        GridFrames frames(grid, count + 1);
+        const auto hidden = static_cast<size_t>(share * static_cast<double>(grid.cells()));
+        const float shared = moves ? 1.0f : 1.0f + 0.5f * static_cast<float>(count);
+        for (int t = 0; t < count; ++t)
+          for (int c = 0; c < kChannels; ++c) std::fill_n(frames.plane(t, c), hidden, 90.0f);
+        const std::vector<float> density(grid.cells() * static_cast<size_t>(count + 1), shared);
+        const GridPictures pictures(frames);
+        const ClutterColours colours(grid, pictures, count, &pool);
+        EXPECT_EQ(colours.hides_much(density, std::vector<int>(grid.cells(), count)),
+                  moves && share > 0.3)
+            << count;
+      }
 }
 
 // Of a corner most frames show one look, and it is not the background.

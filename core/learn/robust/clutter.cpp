@@ -11,6 +11,8 @@ namespace {
 
 // Clutter hides more than this share of the background, as far as that is known.
 constexpr double kClutter = 0.3;
+// What so large a share of the frames shows rests.
+constexpr double kShared = 0.1;
 // No colour says more than this, as a logarithm: those that are seldom seen would.
 constexpr double kMostSaid = 3;
 
@@ -42,17 +44,21 @@ int ClutterColours::colour_of(const float* const look[3], size_t cell) {
   return colour;
 }
 
-bool ClutterColours::hides_much(const std::vector<int>& from) const {
+bool ClutterColours::hides_much(std::span<const float> density,
+                                const std::vector<int>& from) const {
   // Some frames tell, in little time; of a few, all are looked at.
   const int every = std::clamp(count_ / 16, 1, 4);
   const size_t cells = grid_.cells();
   const GridPicture picture(frames_, from);
   const float* const background[3] = {picture.plane(0), picture.plane(1), picture.plane(2)};
+  // Each frame shares its own look.
+  const auto most = static_cast<float>(1 + kShared * count_);
   size_t unlike = 0, all = 0;
   for (int t = 0; t < count_; t += every, all += cells) {
     const float* const look[3] = {frames_.plane(t, 0), frames_.plane(t, 1), frames_.plane(t, 2)};
+    const float* const shared = density.data() + static_cast<size_t>(t) * cells;
     for (size_t cell = 0; cell < cells; ++cell)
-      unlike += differs_at(look, background, cell) ? 1 : 0;
+      unlike += shared[cell] < most && differs_at(look, background, cell) ? 1 : 0;
   }
   return static_cast<double>(unlike) > kClutter * static_cast<double>(all);
 }

@@ -22,9 +22,10 @@ class ClutterColours {
   ClutterColours(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
   static uint64_t bytes(const Grid& grid, uint64_t looks, int threads);
 
-  // True where much of what frames show is unlike the background. from: of each cell the frame
-  // whose look is taken for it.
-  bool hides_much(const std::vector<int>& from) const;
+  // True where much of what frames show is unlike the background, and moves: few frames share it.
+  // Of another scene, many do. from: of each cell the frame whose look is taken for the background;
+  // density: of looks, PatchFrames::density().
+  bool hides_much(std::span<const float> density, const std::vector<int>& from) const;
   // The colours of the background, and of what is unlike it.
   void learn(const std::vector<int>& from);
   // The densities times how much likelier the colours of the 5 x 5 cells around are in the

@@ -131,7 +131,7 @@ void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
                        std::span<const float> density, std::vector<int>* from, Pool* pool) {
   constexpr int kRounds = 3;
   ClutterColours colours(grid, frames, count, pool);
-  if (!colours.hides_much(*from)) return;
+  if (!colours.hides_much(density, *from)) return;
   for (int round = 0; round < kRounds; ++round) {
     colours.learn(*from);
     *from = densest(colours.weigh(density), grid.cells(), pool);
