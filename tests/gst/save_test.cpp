@@ -263,7 +263,7 @@ TEST(SaveErrors, AFileThatCannotBeLoadedChangesNothing) {
   const Bytes whole = read(folder.file());
   Bytes damaged = whole, newer = whole, shorter = whole, longer = whole, large = whole;
   damaged[500] ^= 4;
-  newer[8] = 2;
+  newer[8] = 3;
   shorter.resize(whole.size() / 2);
   longer.push_back(0);
   // 65535 x 65535 pixels.
@@ -288,7 +288,7 @@ TEST(SaveErrors, AFileThatCannotBeLoadedChangesNothing) {
   const Bytes background = element.background_bytes();
   const std::pair<const char*, const char*> cases[] = {
       {"damaged", "checksum"},
-      {"newer", "version 2"},
+      {"newer", "version 3"},
       {"shorter", "bytes in place of"},
       {"longer", "bytes in place of"},
       {"large", "damaged"},
