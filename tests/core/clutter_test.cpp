@@ -42,15 +42,15 @@ bool differ(const GridFrames& frames, int s, int t, size_t cell) {
 // more than it was seen; at least e^-3 and at most e^3.
 std::vector<double> plain_weights(const Grid& grid, const GridFrames& frames, int count,
                                   const std::vector<int>& from) {
-  std::map<Colour, double> behind, before;
-  double all_behind = 512, all_before = 512;
+  std::map<Colour, double> of_background, of_clutter;
+  double all_of_background = 512, all_of_clutter = 512;
   for (size_t cell = 0; cell < grid.cells(); ++cell)
     for (int t = 0; t < count; ++t) {
-      ++behind[colour_of(frames, from[cell], cell)];
-      ++all_behind;
+      ++of_background[colour_of(frames, from[cell], cell)];
+      ++all_of_background;
       if (!differ(frames, from[cell], t, cell)) continue;
-      ++before[colour_of(frames, t, cell)];
-      ++all_before;
+      ++of_clutter[colour_of(frames, t, cell)];
+      ++all_of_clutter;
     }
   std::vector<double> weights;
   for (int t = 0; t < frames.size(); ++t)
@@ -60,8 +60,8 @@ std::vector<double> plain_weights(const Grid& grid, const GridFrames& frames, in
         for (int yy = std::max(0, y - 2); yy <= std::min(grid.rows - 1, y + 2); ++yy)
           for (int xx = std::max(0, x - 2); xx <= std::min(grid.cols - 1, x + 2); ++xx, ++cells) {
             const Colour colour = colour_of(frames, t, static_cast<size_t>(yy * grid.cols + xx));
-            const double likelier =
-                (behind[colour] + 1) / all_behind * all_before / (before[colour] + 1);
+            const double likelier = (of_background[colour] + 1) / all_of_background *
+                                    all_of_clutter / (of_clutter[colour] + 1);
             sum += std::clamp(std::log(likelier), -3.0, 3.0);
           }
         weights.push_back(std::exp(sum / cells));
