@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include "core/passes/bands.h"
@@ -44,11 +45,57 @@ void weigh_columns(const uint8_t* first, uint32_t less_first, const uint8_t* las
     sums[x] = shared * sums[x] - less_first * first[x] - less_last * last[x];
 }
 
-// Means of cells from sums up to their edges, which are integers: exact to the division.
-void divide_differences(const double* HWY_RESTRICT before, const double* HWY_RESTRICT across,
-                        double rows, size_t count, float* HWY_RESTRICT means) {
-  for (size_t i = 0; i < count; ++i)
-    means[i] = static_cast<float>((before[i + 1] - before[i]) / (rows * across[i]));
+// Sums of neighbouring columns that begin at begin[i]: of kLeast columns, and one more where
+// wide[i].
+template <size_t kLeast>
+void add_few(const uint32_t* HWY_RESTRICT sums, const uint32_t* HWY_RESTRICT begin,
+             const uint8_t* HWY_RESTRICT wide, size_t count, uint64_t* HWY_RESTRICT cells) {
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t* const from = sums + (begin[i] - begin[0]);
+    uint64_t sum = wide[i] ? from[kLeast] : 0;
+    for (size_t x = 0; x < kLeast; ++x) sum += from[x];
+    cells[i] = sum;
+  }
+}
+
+// The same of `least` columns. Cells of small pictures have a few, for which a loop of its own
+// would take longer than the sum.
+void add_columns(const uint32_t* HWY_RESTRICT sums, const uint32_t* HWY_RESTRICT begin,
+                 const uint8_t* HWY_RESTRICT wide, size_t least, size_t count,
+                 uint64_t* HWY_RESTRICT cells) {
+  switch (least) {
+    case 0:
+      return add_few<0>(sums, begin, wide, count, cells);
+    case 1:
+      return add_few<1>(sums, begin, wide, count, cells);
+    case 2:
+      return add_few<2>(sums, begin, wide, count, cells);
+    case 3:
+      return add_few<3>(sums, begin, wide, count, cells);
+    case 4:
+      return add_few<4>(sums, begin, wide, count, cells);
+    case 5:
+      return add_few<5>(sums, begin, wide, count, cells);
+    case 6:
+      return add_few<6>(sums, begin, wide, count, cells);
+    case 7:
+      return add_few<7>(sums, begin, wide, count, cells);
+    default:
+      break;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t* const from = sums + (begin[i] - begin[0]);
+    const size_t columns = least + (wide[i] ? 1 : 0);
+    uint64_t sum = 0;
+    for (size_t x = 0; x < columns; ++x) sum += from[x];
+    cells[i] = sum;
+  }
+}
+
+// Means of cells from their sums, which are integers: exact to the division.
+void divide_sums(const double* HWY_RESTRICT sums, const double* HWY_RESTRICT across, double rows,
+                 size_t count, float* HWY_RESTRICT means) {
+  for (size_t i = 0; i < count; ++i) means[i] = static_cast<float>(sums[i] / (rows * across[i]));
 }
 
 }  // namespace HWY_NAMESPACE
@@ -61,7 +108,8 @@ namespace {
 
 HWY_EXPORT(sum_columns);
 HWY_EXPORT(weigh_columns);
-HWY_EXPORT(divide_differences);
+HWY_EXPORT(add_columns);
+HWY_EXPORT(divide_sums);
 
 }  // namespace
 
@@ -100,54 +148,96 @@ void sum_rows(const Grid& grid, const Samples& samples, int top, int bottom, int
    static_cast<size_t>(count), sums);
 }
 
+// The columns of a grid in samples that `shared` pixels of a row share: the edge of a cell may part
+// such pixels.
+class Columns {
+ public:
+  Columns(const Grid& grid, int shared)
+      : cols_(static_cast<size_t>(grid.cols)),
+        all_((grid.width + shared - 1) / shared),
+        least_(grid.width / grid.cols / shared) {
+    for (size_t col = 0; col <= cols_; ++col) {
+      const int x = grid.left(static_cast<int>(col));
+      begin_[col] = static_cast<uint32_t>(x / shared);
+      parted_[col] = static_cast<uint32_t>(x % shared);
+      if (col == 0) continue;
+      across_[col - 1] = x - grid.left(static_cast<int>(col) - 1);
+      wide_[col - 1] = begin_[col] - begin_[col - 1] > static_cast<uint32_t>(least_);
+    }
+  }
+
+  size_t cols() const { return cols_; }
+  // Samples of a row.
+  int all() const { return all_; }
+  // Of a cell: samples left of it, and pixels left of it that share its first sample.
+  int begin(size_t col) const { return static_cast<int>(begin_[col]); }
+  uint32_t parted(size_t col) const { return parted_[col]; }
+  // Where the samples end that cells before `col` have a part of.
+  int end(size_t col) const { return begin(col) + (parted_[col] > 0 ? 1 : 0); }
+  const double* across() const { return across_.data(); }  // pixels
+
+  // Of cells first .. first + count - 1, whose samples' columns have these sums.
+  void add_up(const uint32_t* sums, size_t first, size_t count, uint64_t* cells) const {
+    HWY_DYNAMIC_DISPATCH(add_columns)
+    (sums, begin_.data() + first, wide_.data() + first, static_cast<size_t>(least_),
+     count, cells);
+  }
+
+ private:
+  static constexpr size_t kMost = 2 * kMostCellsAlong;
+  size_t cols_;
+  int all_, least_;  // cells have so many samples, or one more
+  std::array<uint32_t, kMost + 1> begin_, parted_;
+  std::array<double, kMost> across_;
+  std::array<uint8_t, kMost> wide_;
+};
+
 // Of rows of cells first .. end - 1.
-void means_of_rows(const Grid& grid, int first_row, int end_row, const Samples& samples,
-                   float* means) {
+void means_of_rows(const Grid& grid, const Columns& columns, int first_row, int end_row,
+                   const Samples& samples, float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
   alignas(64) uint32_t sums[kColumns + 1];
-  // Of the samples before each; and of pixels left of a cell's left edge.
-  uint64_t running[kColumns + 1];
-  running[0] = 0;
-  std::array<double, 2 * kMostCellsAlong + 1> before, across;
-  // Samples left of a cell's edge, which may part the pixels of the next one.
-  struct Edge {
-    int samples, pixels;
-  };
-  std::array<Edge, 2 * kMostCellsAlong + 1> edges;
-  const auto cols = static_cast<size_t>(grid.cols);
-  const int shared = samples.columns;
-  for (size_t col = 0; col <= cols; ++col) {
-    const int x = grid.left(static_cast<int>(col));
-    edges[col] = {x / shared, x % shared};
-    if (col > 0) across[col - 1] = x - grid.left(static_cast<int>(col) - 1);
-  }
-  const int all = (grid.width + shared - 1) / shared;
-  before[0] = 0;
+  std::array<uint64_t, 2 * kMostCellsAlong> cells;
+  std::array<double, 2 * kMostCellsAlong> exact;
+  const size_t cols = columns.cols();
+  const auto shared = static_cast<uint64_t>(samples.columns);
   for (int row = first_row; row < end_row; ++row, means += cols) {
     const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
-    uint64_t sum = 0;  // of the samples so far
-    size_t next = 1;
-    for (int first = 0; first < all; first += kColumns) {
-      const int count = std::min(kColumns, all - first);
-      sum_rows(grid, samples, top, bottom, first, count, sums);
-      for (int s = 0; s < count; ++s) running[s + 1] = running[s] + sums[s];
-      // Of an edge that parts no pixels, this is not a part of the sum.
-      sums[count] = 0;
-      // The edges that lie in these columns.
-      size_t last = cols;
-      if (count < all)
-        while (last >= next && edges[last].samples + (edges[last].pixels > 0) > first + count)
-          --last;
-      for (; next <= last; ++next) {
-        const auto [end, part] = edges[next];
-        const uint64_t pixels = static_cast<uint64_t>(shared) * (sum + running[end - first]) +
-                                static_cast<uint64_t>(part) * sums[end - first];
-        before[next] = static_cast<double>(static_cast<int64_t>(pixels));
+    for (size_t first = 0, end; first < cols; first = end) {
+      const int left = columns.begin(first);
+      end = columns.all() <= kColumns ? cols : first;
+      while (end < cols && columns.end(end + 1) - left <= kColumns) ++end;
+      if (end == first) {
+        // A cell that is wider than that, piece by piece.
+        const auto sum_of = [&](int begin, int count) {
+          sum_rows(grid, samples, top, bottom, begin, count, sums);
+          return std::accumulate(sums, sums + count, uint64_t{0});
+        };
+        cells[first] = 0;
+        for (int x = left; x < columns.begin(first + 1); x += kColumns)
+          cells[first] += sum_of(x, std::min(kColumns, columns.begin(first + 1) - x));
+        const auto parted = [&](size_t col) {
+          return columns.parted(col) > 0 ? columns.parted(col) * sum_of(columns.begin(col), 1) : 0;
+        };
+        exact[first] =
+            static_cast<double>(shared * cells[first] + parted(first + 1) - parted(first));
+        ++end;
+        continue;
       }
-      sum += running[count];
+      const int count = columns.end(end) - left;
+      sum_rows(grid, samples, top, bottom, left, count, sums);
+      sums[count] = 0;
+      columns.add_up(sums, first, end - first, cells.data() + first);
+      for (size_t col = first; col < end; ++col) {
+        const uint64_t pixels =
+            shared * cells[col] +
+            uint64_t{columns.parted(col + 1)} * sums[columns.begin(col + 1) - left] -
+            uint64_t{columns.parted(col)} * sums[columns.begin(col) - left];
+        exact[col] = static_cast<double>(static_cast<int64_t>(pixels));
+      }
     }
-    HWY_DYNAMIC_DISPATCH(divide_differences)
-    (before.data(), across.data(), bottom - top, cols, means);
+    HWY_DYNAMIC_DISPATCH(divide_sums)
+    (exact.data(), columns.across(), bottom - top, cols, means);
   }
 }
 
@@ -159,7 +249,7 @@ int row_at(const Grid& grid, int top) {
 }  // namespace
 
 void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
-  means_of_rows(grid, 0, grid.rows, {plane}, means);
+  means_of_rows(grid, Columns(grid, 1), 0, grid.rows, {plane}, means);
 }
 
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
@@ -167,13 +257,15 @@ void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& pictu
   const int own = row_at(grid, band.own_first()), rows = row_at(grid, band.own_end()) - own;
   const size_t pixels =
       static_cast<size_t>(grid.width) * static_cast<size_t>(grid.top(own + rows) - grid.top(own));
+  const bool shares = picture.shape.is_shared();
+  const Columns own_samples(grid, 1), shared_ones(grid, shares ? picture.shape.columns : 1);
   for_rows(pool, rows, pixels, [&](int at, int count) {
     const int first = own + at;
     for (int c = 0; c < kChannels; ++c) {
       Samples samples = {picture.plane[c], band.first()};
-      if (c > 0 && picture.shape.is_shared())
-        samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
-      means_of_rows(grid, first, first + count, samples,
+      const bool shared = c > 0 && shares;
+      if (shared) samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
+      means_of_rows(grid, shared ? shared_ones : own_samples, first, first + count, samples,
                     cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
     }
   });

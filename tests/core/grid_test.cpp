@@ -101,5 +101,28 @@ TEST(Cells, MeansOfSharedSamplesAreThoseOfTheirPixels) {
         });
 }
 
+// Cells that are wider than what is summed together; of samples that pixels share, too, where edges
+// of cells part such pixels.
+TEST(Cells, MayBeWiderThanWhatIsSummedTogether) {
+  for (int width : {1500000, 3000001}) {
+    std::mt19937 rng(7);
+    const Grid grid(width, 1);
+    ASSERT_GT(grid.left(1), width > 2000000 ? 4096 : 2048);
+    const ChromaShape shape = {width, 1, 2, 1};
+    std::vector<uint8_t> brightness(shape.pixels()), chroma(shape.samples());
+    for (auto* plane : {&brightness, &chroma})
+      for (uint8_t& sample : *plane) sample = static_cast<uint8_t>(rng() % 256);
+    const uint8_t* const planes[] = {brightness.data(), chroma.data(), chroma.data()};
+    GridFrames cells(grid, 1);
+    find_own_cells(grid, Band(1), KeptPicture(planes, shape), &cells, 0, nullptr);
+    for (int col = 0; col < grid.cols; ++col) {
+      ASSERT_EQ(cells.plane(0, 0)[col],
+                mean_of(grid, 0, col, [&](int x, int) { return planes[0][x]; }));
+      ASSERT_EQ(cells.plane(0, 1)[col],
+                mean_of(grid, 0, col, [&](int x, int) { return planes[1][x / 2]; }));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test
