@@ -532,13 +532,12 @@ void Decision::learn(int first_row, int row_count) {
       look_at(&run);
       uint8_t column[kLongestRun + 2 * kMostNear], wide[kLongestRun];
       const int start = left - near, length = run.count + 2 * near;
-      if (start >= 0 && start + length <= shape_.width)
-        either(rows[0] + start, rows[1] + start, rows[2] + start, length, column);
-      else
-        for (int p = 0; p < length; ++p) {
-          const int at = std::clamp(start + p, 0, shape_.width - 1);
-          column[p] = rows[0][at] | rows[1][at] | rows[2][at];
-        }
+      // The border's pixels stand for those outside.
+      const int from = std::max(start, 0), to = std::min(start + length, shape_.width);
+      uint8_t *const first = column + (from - start), *const last = column + (to - start);
+      either(rows[0] + from, rows[1] + from, rows[2] + from, to - from, first);
+      std::fill(column, first, *first);
+      std::fill(last, column + length, last[-1]);
       widen(column + near, run.count, near, wide);
       uint8_t now[kLongestRun];
       std::copy_n(rows[1] + left, run.count, now);

@@ -17,10 +17,14 @@ inline bool copy_if_any(const uint8_t* mask, int count, uint8_t* out) {
     std::memcpy(out, mask, static_cast<size_t>(count));
     return std::memchr(mask, 255, static_cast<size_t>(count)) != nullptr;
   }
-  uint64_t samples[kMaskBlock / 8], any = 0;
-  std::memcpy(samples, mask, kMaskBlock);
-  for (uint64_t eight : samples) any |= eight;
-  std::memcpy(out, samples, kMaskBlock);
+  // Eight at a time, which need not go through memory.
+  uint64_t any = 0;
+  for (int first = 0; first < kMaskBlock; first += 8) {
+    uint64_t eight;
+    std::memcpy(&eight, mask + first, sizeof eight);
+    std::memcpy(out + first, &eight, sizeof eight);
+    any |= eight;
+  }
   return any != 0;
 }
 
