@@ -13,52 +13,115 @@ constexpr float kSame = 12;
 // What a frame counts in a look, at least.
 constexpr float kShare = 0.1f;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
+// Cells that are followed together: plain loops, which the compiler makes vectors of.
+constexpr size_t kTogether = 64;
+
+// Of cells `first` and those after it.
+struct Planes {
+  const float *red, *green, *blue;
+  Planes(const float* const of[3], size_t first)
+      : red(of[0] + first), green(of[1] + first), blue(of[2] + first) {}
+};
+
+// How far cells of two pictures are apart, sum of the channels; returns how many are not the same.
+inline int compare(const Planes& a, const Planes& b, size_t count, float* __restrict apart) {
+  for (size_t i = 0; i < count; ++i)
+    apart[i] = std::abs(a.red[i] - b.red[i]) + std::abs(a.green[i] - b.green[i]) +
+               std::abs(a.blue[i] - b.blue[i]);
+  int others = 0;
+  for (size_t i = 0; i < count; ++i) others += apart[i] < kSame ? 0 : 1;
+  return others;
+}
+
+// Calls work(first, count) for blocks of cells; for most of them `count` is a constant, which
+// compilers make better loops of.
+template <typename Work>
+void in_blocks(size_t cells, const Work& work) {
+  size_t first = 0;
+  for (; first + kTogether <= cells; first += kTogether) work(first, kTogether);
+  if (first < cells) work(first, cells - first);
+}
 
 }  // namespace
 
 StandingLooks::StandingLooks(const Grid& grid)
-    : grid_(grid), looks_(grid, 3), cells_(grid.cells()), differs_(grid.cells()) {
+    : grid_(grid),
+      looks_(grid, 3),
+      cells_(grid.cells()),
+      frames_(grid.cells()),
+      next_frames_(grid.cells()),
+      differs_(grid.cells()) {
   found_.reserve(grid.cells());
 }
 
 uint64_t StandingLooks::bytes(const Grid& grid) {
-  return GridFrames::bytes(grid, 3) + grid.cells() * (sizeof(Cell) + sizeof(uint8_t) + sizeof(int));
+  return GridFrames::bytes(grid, 3) +
+         grid.cells() * (sizeof(Cell) + sizeof(uint8_t) + 3 * sizeof(int));
 }
 
-void StandingLooks::forget() { std::fill(cells_.begin(), cells_.end(), Cell()); }
+void StandingLooks::forget() {
+  std::fill(cells_.begin(), cells_.end(), Cell());
+  std::fill(frames_.begin(), frames_.end(), 0);
+  std::fill(next_frames_.begin(), next_frames_.end(), 0);
+}
 
 void StandingLooks::follow(const float* const frame[3], const Gain& gain, int64_t number) {
-  number_ = number;
+  previous_ = std::exchange(number_, number);
   const Gain inverse = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
-  float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1), looks_.plane(kLook, 2)};
-  float* const next[3] = {looks_.plane(kNext, 0), looks_.plane(kNext, 1), looks_.plane(kNext, 2)};
-  for (size_t at = 0; at < cells_.size(); ++at) {
-    Cell& cell = cells_[at];
-    float level[3], from_look = 0;
+  const float* const looks[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
+                                 looks_.plane(kLook, 2)};
+  in_blocks(cells_.size(), [&](size_t first, size_t count) {
+    float level[kChannels][kTogether], apart[kTogether];
     for (size_t c = 0; c < kChannels; ++c) {
-      level[c] = frame[c][at] * inverse[c];
-      from_look += std::abs(level[c] - look[c][at]);
+      const float* const now = frame[c] + first;
+      for (size_t i = 0; i < count; ++i) level[c][i] = now[i] * inverse[c];
     }
-    const auto add = [&](float* const levels[3], Look* to, float least_share) {
-      ++to->frames;
-      to->last = number;
-      // No division where it is known which one is more.
-      const float share = static_cast<float>(to->frames) * least_share >= 2
-                              ? least_share
-                              : std::max(least_share, 1 / static_cast<float>(to->frames));
-      for (size_t c = 0; c < kChannels; ++c) levels[c][at] += share * (level[c] - levels[c][at]);
-    };
-    if (cell.look.frames > 0 && from_look < kSame) {
-      add(look, &cell.look, kShare);
-      cell.next = {};
-      continue;
+    const float* const now[3] = {level[0], level[1], level[2]};
+    compare({now, 0}, {looks, first}, count, apart);
+    int* __restrict frames = frames_.data() + first;
+    int* __restrict next_frames = next_frames_.data() + first;
+    // Whether a cell shows its look, and what the frame counts in that: nothing where it does not.
+    int shows[kTogether], others = 0;
+    float share[kTogether];
+    for (size_t i = 0; i < count; ++i) {
+      shows[i] = static_cast<int>(frames[i] > 0) & static_cast<int>(apart[i] < kSame);
+      others += 1 - shows[i];
+      frames[i] += shows[i];
+      next_frames[i] &= shows[i] - 1;
+      const float part = 1 / static_cast<float>(frames[i] + 1 - shows[i]);
+      share[i] = static_cast<float>(shows[i]) * (part > kShare ? part : kShare);
     }
-    float from_next = 0;
-    for (size_t c = 0; c < kChannels; ++c) from_next += std::abs(level[c] - next[c][at]);
-    if (cell.next.frames == 0 || from_next >= kSame) cell.next = {number, number, 0};
-    add(next, &cell.next, 0);
-    if (cell.next.frames == kSteady) take_next(at);
+    for (size_t c = 0; c < kChannels; ++c) {
+      float* const look = looks_.plane(kLook, static_cast<int>(c)) + first;
+      for (size_t i = 0; i < count; ++i) look[i] += share[i] * (level[c][i] - look[i]);
+    }
+    for (size_t i = 0; i < count && others > 0; ++i) {
+      if (shows[i]) continue;
+      see_other(first + i, {level[0][i], level[1][i], level[2][i]});
+      --others;
+    }
+  });
+}
+
+// A cell that does not show its look, or has none.
+void StandingLooks::see_other(size_t at, const std::array<float, kChannels>& level) {
+  Cell& cell = cells_[at];
+  int& frames = next_frames_[at];
+  if (frames_[at] > 0 && frames == 0) cell.look.last = previous_;
+  float* const next[3] = {looks_.plane(kNext, 0) + at, looks_.plane(kNext, 1) + at,
+                          looks_.plane(kNext, 2) + at};
+  float away = 0;
+  for (size_t c = 0; c < kChannels; ++c) away += std::abs(level[c] - *next[c]);
+  if (frames == 0 || away >= kSame) {
+    cell.next_since = number_;
+    frames = 1;
+    for (size_t c = 0; c < kChannels; ++c) *next[c] = level[c];
+    return;
   }
+  ++frames;
+  const float share = 1 / static_cast<float>(frames);
+  for (size_t c = 0; c < kChannels; ++c) *next[c] += share * (level[c] - *next[c]);
+  if (frames == kSteady) take_next(at);
 }
 
 void StandingLooks::take_next(size_t at) {
@@ -67,8 +130,10 @@ void StandingLooks::take_next(size_t at) {
   for (int c = 0; c < kChannels; ++c)
     from_before += std::abs(looks_.plane(kNext, c)[at] - looks_.plane(kBefore, c)[at]);
   const Look before = std::exchange(cell.before, cell.look);
-  cell.look = std::exchange(cell.next, Look());
-  if (before.frames > 0 && from_before < kSame &&
+  const bool had_before = std::exchange(cell.had_before, frames_[at] > 0);
+  cell.look = {cell.next_since, number_};
+  frames_[at] = std::exchange(next_frames_[at], 0);
+  if (had_before && from_before < kSame &&
       cell.look.since - before.last <= before.last - before.since)
     cell.look.since = before.since;
   for (int c = 0; c < kChannels; ++c) {
@@ -105,18 +170,18 @@ const std::vector<int>& StandingLooks::stood(const float* const background[3], i
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
   const auto ripe = [&](size_t cell) { return number_ - cells_[cell].look.since >= frames; };
-  // Few cells differ: what else is known of a cell is looked at there only.
-  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
-    float sum = 0;
-    for (int c = 0; c < kChannels; ++c) sum += std::abs(look[c][cell] - background[c][cell]);
-    differs_[cell] = sum >= kSame;
-  }
   bool any = false;
-  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
-    if (!differs_[cell]) continue;
-    differs_[cell] = shows(cell);
-    any |= differs_[cell] && ripe(cell);
-  }
+  in_blocks(grid_.cells(), [&](size_t first, size_t count) {
+    float apart[kTogether];
+    uint8_t* const differs = differs_.data() + first;
+    std::fill_n(differs, count, uint8_t{0});
+    // Few cells differ: what else is known of a cell is looked at there only.
+    if (compare({look, first}, {background, first}, count, apart) == 0) return;
+    for (size_t i = 0; i < count; ++i) {
+      differs[i] = apart[i] >= kSame && shows(first + i);
+      any |= differs[i] && ripe(first + i);
+    }
+  });
   if (!any) return found_;
   CellRegions regions(grid_);
   for (const std::vector<int>& region : regions.find(differs_)) {

@@ -1,6 +1,7 @@
 // What each cell of the picture shows, and since when: passers-by aside.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -43,23 +44,28 @@ class StandingLooks {
   const std::vector<int>& stood(const float* const background[3], int64_t frames);
 
  private:
+  // The frames that showed it, from the first to the last one.
   struct Look {
     int64_t since = 0, last = 0;
-    int frames = 0;  // that showed it; 0: there is none
   };
-  // What it shows, what may become the next look, and the one before.
+  // What it shows (the last frame is known once another one shows something else), the one before,
+  // if there was one, and when that came which may become the next.
   struct Cell {
-    Look look, next, before;
+    Look look, before;
+    int64_t next_since = 0;
+    bool had_before = false;
   };
-  bool shows(size_t cell) const {
-    return cells_[cell].look.frames >= kSteady && cells_[cell].next.frames == 0;
-  }
+  bool shows(size_t cell) const { return frames_[cell] >= kSteady && next_frames_[cell] == 0; }
+  void see_other(size_t cell, const std::array<float, kChannels>& level);
   void take_next(size_t cell);
 
   Grid grid_;
-  GridFrames looks_;  // as in Cell
+  GridFrames looks_;  // what it shows, what may become the next look, and the one before
   std::vector<Cell> cells_;
-  int64_t number_ = 0;
+  // Of each cell: how many frames showed its look, and what may become the next one; 0: there is
+  // none.
+  std::vector<int> frames_, next_frames_;
+  int64_t number_ = 0, previous_ = 0;  // of the newest frame, and of the one before
   std::vector<uint8_t> differs_;
   std::vector<int> found_;
   size_t news_ = 0;
