@@ -51,19 +51,26 @@ uint64_t SceneWatch::bytes(const Grid& grid) {
 
 void SceneWatch::find_edges(const float* const planes[3], std::vector<float>* edges) {
   const auto stride = static_cast<size_t>(grid_.cols);
-  float* edge = edges->data();
+  float* __restrict edge = edges->data();
   for (size_t c = 0; c < kChannels; ++c) {
-    for (size_t row = 0; row < rows_; ++row)
-      for (size_t col = 0; col < cols_; ++col) {
-        const float* cell = planes[c] + 2 * row * stride + 2 * col;
-        blocks_[row * cols_ + col] = (cell[0] + cell[1] + cell[stride] + cell[stride + 1]) / 4;
+    float* __restrict block = blocks_.data();
+    for (size_t row = 0; row < rows_; ++row, block += cols_) {
+      const float *const above = planes[c] + 2 * row * stride, *const below = above + stride;
+      for (size_t col = 0; col < cols_; ++col)
+        block[col] =
+            (above[2 * col] + above[2 * col + 1] + below[2 * col] + below[2 * col + 1]) / 4;
+    }
+    for (size_t row = 0; row < rows_; ++row, edge += 2 * cols_) {
+      const float* const here = blocks_.data() + row * cols_;
+      // There is no edge at the border.
+      const float* const below = row + 1 < rows_ ? here + cols_ : here;
+      for (size_t col = 0; col + 1 < cols_; ++col) {
+        edge[2 * col] = here[col + 1] - here[col];
+        edge[2 * col + 1] = below[col] - here[col];
       }
-    for (size_t row = 0; row < rows_; ++row)
-      for (size_t col = 0; col < cols_; ++col) {
-        const size_t at = row * cols_ + col;
-        *edge++ = col + 1 < cols_ ? blocks_[at + 1] - blocks_[at] : 0;
-        *edge++ = row + 1 < rows_ ? blocks_[at + cols_] - blocks_[at] : 0;
-      }
+      edge[2 * cols_ - 2] = 0;
+      edge[2 * cols_ - 1] = below[cols_ - 1] - here[cols_ - 1];
+    }
   }
 }
 
