@@ -179,8 +179,7 @@ class Columns {
   // Of cells first .. first + count - 1, whose samples' columns have these sums.
   void add_up(const uint32_t* sums, size_t first, size_t count, uint64_t* cells) const {
     HWY_DYNAMIC_DISPATCH(add_columns)
-    (sums, begin_.data() + first, wide_.data() + first, static_cast<size_t>(least_),
-     count, cells);
+    (sums, begin_.data() + first, wide_.data() + first, static_cast<size_t>(least_), count, cells);
   }
 
  private:
