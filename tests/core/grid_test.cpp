@@ -109,7 +109,7 @@ TEST(Cells, MayBeWiderThanWhatIsSummedTogether) {
     const Grid grid(width, 1);
     ASSERT_GT(grid.left(1), width > 2000000 ? 4096 : 2048);
     const ChromaShape shape = {width, 1, 2, 1};
-    std::vector<uint8_t> brightness(shape.pixels()), chroma(shape.samples());
+    BeforeTheEdge<uint8_t> brightness(shape.pixels()), chroma(shape.samples());
     for (auto* plane : {&brightness, &chroma})
       for (uint8_t& sample : *plane) sample = static_cast<uint8_t>(rng() % 256);
     const uint8_t* const planes[] = {brightness.data(), chroma.data(), chroma.data()};

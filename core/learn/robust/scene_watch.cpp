@@ -51,9 +51,9 @@ uint64_t SceneWatch::bytes(const Grid& grid) {
 
 void SceneWatch::find_edges(const float* const planes[3], std::vector<float>* edges) {
   const auto stride = static_cast<size_t>(grid_.cols);
-  float* __restrict edge = edges->data();
+  float* edge = edges->data();
   for (size_t c = 0; c < kChannels; ++c) {
-    float* __restrict block = blocks_.data();
+    float* block = blocks_.data();
     for (size_t row = 0; row < rows_; ++row, block += cols_) {
       const float *const above = planes[c] + 2 * row * stride, *const below = above + stride;
       for (size_t col = 0; col < cols_; ++col)

@@ -78,8 +78,8 @@ void StandingLooks::follow(const float* const frame[3], const Gain& gain, int64_
     }
     const float* const now[3] = {level[0], level[1], level[2]};
     compare({now, 0}, {looks, first}, count, apart);
-    int* __restrict frames = frames_.data() + first;
-    int* __restrict next_frames = next_frames_.data() + first;
+    int* const frames = frames_.data() + first;
+    int* const next_frames = next_frames_.data() + first;
     // Whether a cell shows its look, and what the frame counts in that: nothing where it does not.
     int shows[kTogether], others = 0;
     float share[kTogether];
