@@ -17,7 +17,7 @@ float apart(const Level& a, const Level& b) {
   return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
 }
 
-// One cell. The constants are those that the header and the learner's documentation name.
+// One cell. The constants are those of standing_looks.cpp.
 class SlowLook {
  public:
   void follow(const Level& now, int64_t number) {
@@ -165,8 +165,8 @@ TEST_P(StandingLooksOf, WhatHasStoodIsFoundWhereEachCellSaysSo) {
     }
     ASSERT_EQ(stood.empty(), number - 30 < 50);
   }
-  // All but one of them are known by now; of that one only its neighbours are found with it. And
-  // who looks elsewhere for a moment does not stand.
+  // Where the background has all bags but one, this one is found, with its neighbours; and not
+  // while something passes in front of it.
   const auto first = static_cast<size_t>(grid.cols + 1);
   std::vector<float> known = with_bag;
   for (size_t c = 0; c < kChannels; ++c) known[c * cells + first] = 100;
