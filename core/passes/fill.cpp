@@ -76,8 +76,8 @@ struct Column {
   hn::Vec<Samples<T>> at(size_t t) const { return hn::LoadU(Samples<T>(), samples + t * stride); }
 };
 
-// Counts in samples, as far as bytes can count: part(t, first, second) adds to them what plane t
-// has. total: of as many as are wanted, 1 or 2.
+// Counts of samples, as far as bytes can count: part(t, first, second) adds to them 1 or 0 for
+// plane t. total: of as many as are wanted, 1 or 2.
 template <size_t kCounts, typename T, class Part>
 HWY_INLINE void count_samples(size_t planes, uint16_t (*total)[64], Part part) {
   const Samples<T> d;
@@ -95,6 +95,12 @@ HWY_INLINE void count_samples(size_t planes, uint16_t (*total)[64], Part part) {
     for (size_t i = 0; i < hn::Lanes(d); ++i)
       total[kCounts - 1][i] = static_cast<uint16_t>(total[kCounts - 1][i] + counted[i]);
   }
+}
+
+// 1 where x < limit, else 0. Masks of comparisons would take longer to become numbers.
+template <class V>
+HWY_INLINE V is_below(V x, V limit) {
+  return hn::Min(hn::SaturatedSub(limit, x), hn::Set(hn::DFromV<V>(), hn::TFromV<V>{1}));
 }
 
 // The median of each pixel's samples that are not masked, the mean of the middle two rounded down
@@ -116,39 +122,39 @@ HWY_INLINE void take_median(const Column<T>& column, const uint16_t* HWY_RESTRIC
     rank[i] = static_cast<uint16_t>(masked[i] + std::max(all - masked[i] - 1, 0) / 2);
   }
   const auto low = hn::Load(d, median), high = hn::Add(low, hn::Set(d, static_cast<T>(near - 1)));
-  count_samples<2, T>(column.planes, below, [&](size_t t, auto& under, auto& up_to) HWY_ATTR {
+  count_samples<2, T>(column.planes, below, [&](size_t t, auto& under, auto& over) HWY_ATTR {
     const auto x = column.at(t);
-    under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(x, low)));
-    up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(hn::Gt(x, high))));
+    under = hn::Add(under, is_below(x, low));
+    over = hn::Add(over, is_below(high, x));
   });
   int far = 0;
   for (size_t i = 0; i < lanes; ++i)
-    far |= static_cast<int>(masked[i] != all) &
-           (static_cast<int>(below[0][i] > rank[i]) | static_cast<int>(below[1][i] <= rank[i]));
+    far |= static_cast<int>(masked[i] != all) & (static_cast<int>(below[0][i] > rank[i]) |
+                                                 static_cast<int>(all - below[1][i] <= rank[i]));
   if (far) std::memset(median, 0, sizeof(median));
   for (int bit = far ? 128 * unit : near / 2; bit > 0; bit /= 2) {
     for (size_t i = 0; i < lanes; ++i) candidate[i] = static_cast<T>(median[i] + bit);
     const auto limit = hn::Load(d, candidate);
     count_samples<1, T>(column.planes, below, [&](size_t t, auto& under, auto&) HWY_ATTR {
-      under = hn::Sub(under, hn::VecFromMask(d, hn::Lt(column.at(t), limit)));
+      under = hn::Add(under, is_below(column.at(t), limit));
     });
     for (size_t i = 0; i < lanes; ++i)
       median[i] = below[0][i] <= rank[i] ? candidate[i] : median[i];
   }
-  // The upper of the middle two is the same, or the least sample above.
-  const auto lower = hn::Load(d, median);
+  // The upper of the middle two is the same, or the least sample above: that is so much above,
+  // less 1, so that those that are not above count for more than any.
+  const auto lower = hn::Load(d, median), one = hn::Set(d, T{1});
   auto least = hn::Set(d, static_cast<T>(~T{0}));
-  count_samples<1, T>(column.planes, below, [&](size_t t, auto& up_to, auto&) HWY_ATTR {
-    const auto x = column.at(t);
-    const auto above = hn::Gt(x, lower);
-    up_to = hn::Sub(up_to, hn::VecFromMask(d, hn::Not(above)));
-    least = hn::IfThenElse(above, hn::Min(least, x), least);
+  count_samples<1, T>(column.planes, below, [&](size_t t, auto& over, auto&) HWY_ATTR {
+    const auto above = hn::SaturatedSub(column.at(t), lower);
+    over = hn::Add(over, hn::Min(above, one));
+    least = hn::Min(least, hn::Sub(above, one));
   });
-  hn::Store(least, d, upper);
+  hn::Store(hn::Add(hn::Add(lower, least), one), d, upper);
   for (size_t i = 0; i < lanes; ++i) {
     if (masked[i] == all) continue;
     const int number = all - masked[i];
-    const bool next = number % 2 == 0 && below[0][i] == masked[i] + number / 2;
+    const bool next = number % 2 == 0 && all - below[0][i] == masked[i] + number / 2;
     level[i] = static_cast<T>((median[i] + (next ? upper[i] : median[i])) / 2);
   }
 }
@@ -238,7 +244,9 @@ size_t round_up(size_t count) { return (count + kUnit - 1) / kUnit * kUnit; }
 size_t run_of(int snapshots, bool deep) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
   const size_t of_pixel = m * (kChannels * (deep ? 2 : 1) + 1);
-  return std::clamp(kRunBytes / of_pixel / kUnit * kUnit, kUnit, size_t{4096});
+  // An odd number of cache lines: those of all snapshots at a pixel are then in different sets.
+  const size_t units = std::clamp<size_t>(kRunBytes / of_pixel / kUnit, 1, 4096 / kUnit);
+  return (units - 1) / 2 * 2 * kUnit + kUnit;
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/mask.cpp"
 #include "core/passes/simd.h"
+// After simd.h.
+#include "core/passes/even_odd.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace qdmd {
@@ -28,28 +30,103 @@ void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
   for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor);
 }
 
+// Rows of sums are read and written here only: in which order is no matter to others. They, and
+// padded rows, have room for whole vectors.
+#if HWY_TARGET == HWY_SCALAR
 // padded: two samples before the row's first and two after its last.
-void sum_five_columns(const uint8_t* HWY_RESTRICT padded, size_t count,
-                      uint16_t* HWY_RESTRICT out) {
+void sum_five_columns(const uint8_t* padded, size_t count, uint16_t* out) {
   for (size_t i = 0; i < count; ++i)
     out[i] = static_cast<uint16_t>(padded[i] + padded[i + 1] + padded[i + 2] + padded[i + 3] +
                                    padded[i + 4]);
 }
 
-void sum_five_rows(const uint16_t* const* rows, size_t count, uint16_t* HWY_RESTRICT out) {
-  const uint16_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4];
-  for (size_t i = 0; i < count; ++i)
-    out[i] = static_cast<uint16_t>(a[i] + b[i] + c[i] + d[i] + e[i]);
+uint16_t sum_five(const uint16_t* const* rows, size_t i) {
+  return static_cast<uint16_t>(rows[0][i] + rows[1][i] + rows[2][i] + rows[3][i] + rows[4][i]);
+}
+
+// Of five rows of sums, what is the mean of 25 samples, rounded.
+void mean_row(const uint16_t* const* rows, size_t count, uint8_t* out) {
+  for (size_t i = 0; i < count; ++i) out[i] = static_cast<uint8_t>((sum_five(rows, i) + 12) / 25);
 }
 
 // 1 where the five rows' sums exceed 25 thresholds.
+void exceed_row(const uint16_t* const* rows, const uint8_t* threshold, size_t count, uint8_t* out) {
+  for (size_t i = 0; i < count; ++i) out[i] = sum_five(rows, i) > 25 * threshold[i];
+}
+#else
+void sum_five_columns(const uint8_t* HWY_RESTRICT padded, size_t count,
+                      uint16_t* HWY_RESTRICT out) {
+  const EvenOdd::Bytes d;
+  const EvenOdd::Words d16;
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto before = hn::LoadU(d, padded + i), here = hn::LoadU(d, padded + i + 2),
+               after = hn::LoadU(d, padded + i + 4);
+    // What a pixel at an even place and the one after it have in common.
+    const auto both = hn::Add(hn::Add(EvenOdd::odd(before), EvenOdd::even(here)),
+                              hn::Add(EvenOdd::odd(here), EvenOdd::even(after)));
+    hn::StoreU(hn::Add(both, EvenOdd::even(before)), d16, out + i);
+    hn::StoreU(hn::Add(both, EvenOdd::odd(after)), d16, out + i + hn::Lanes(d16));
+  }
+}
+
+HWY_INLINE EvenOdd::V16 sum_five(const uint16_t* const* rows, size_t i) {
+  const EvenOdd::Words d;
+  const auto row = [&](size_t k) HWY_ATTR { return hn::LoadU(d, rows[k] + i); };
+  return hn::Add(hn::Add(hn::Add(row(0), row(1)), hn::Add(row(2), row(3))), row(4));
+}
+
+// Calls vector(i, sums at even places, at odd ones, size) for the vectors of a row; size: pixels of
+// them that are the row's.
+template <class Vector>
+HWY_INLINE void for_sums(const uint16_t* const* rows, size_t count, const Vector& vector) {
+  const size_t lanes = hn::Lanes(EvenOdd::Bytes());
+  for (size_t i = 0; i < count; i += lanes)
+    vector(i, sum_five(rows, i), sum_five(rows, i + hn::Lanes(EvenOdd::Words())),
+           std::min(lanes, count - i));
+}
+
+void mean_row(const uint16_t* const* rows, size_t count, uint8_t* HWY_RESTRICT out) {
+  const EvenOdd::Bytes d;
+  const EvenOdd::Words d16;
+  // (sum + 12) / 25, for sums of 25 bytes.
+  const auto mean = [&](EvenOdd::V16 sum) HWY_ATTR {
+    return hn::ShiftRight<1>(
+        hn::MulHigh(hn::Add(sum, hn::Set(d16, uint16_t{12})), hn::Set(d16, uint16_t{5243})));
+  };
+  for_sums(rows, count, [&](size_t i, EvenOdd::V16 even, EvenOdd::V16 odd, size_t size) HWY_ATTR {
+    const auto means = EvenOdd::joined(mean(even), mean(odd));
+    if (size == hn::Lanes(d)) {
+      hn::StoreU(means, d, out + i);
+      return;
+    }
+    HWY_ALIGN uint8_t last[HWY_MAX_BYTES];
+    hn::Store(means, d, last);
+    std::memcpy(out + i, last, size);
+  });
+}
+
 void exceed_row(const uint16_t* const* rows, const uint8_t* HWY_RESTRICT threshold, size_t count,
                 uint8_t* HWY_RESTRICT out) {
-  const uint16_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4];
-  for (size_t i = 0; i < count; ++i)
-    out[i] = static_cast<uint16_t>(a[i] + b[i] + c[i] + d[i] + e[i]) >
-             static_cast<uint16_t>(25 * threshold[i]);
+  const EvenOdd::Bytes d;
+  const EvenOdd::Words d16;
+  const auto exceed = [&](EvenOdd::V16 sum, EvenOdd::V16 limit) HWY_ATTR {
+    const auto over = hn::SaturatedSub(sum, hn::Mul(limit, hn::Set(d16, uint16_t{25})));
+    return hn::Min(over, hn::Set(d16, uint16_t{1}));
+  };
+  for_sums(rows, count, [&](size_t i, EvenOdd::V16 even, EvenOdd::V16 odd, size_t size) HWY_ATTR {
+    HWY_ALIGN uint8_t last[HWY_MAX_BYTES] = {};
+    const uint8_t* limits = threshold + i;
+    if (size < hn::Lanes(d)) {
+      std::memcpy(last, limits, size);
+      limits = last;
+    }
+    const auto limit = hn::LoadU(d, limits);
+    hn::StoreU(
+        EvenOdd::joined(exceed(even, EvenOdd::even(limit)), exceed(odd, EvenOdd::odd(limit))), d,
+        out + i);
+  });
 }
+#endif
 
 // padded: three samples before the row's first and three after its last.
 void sum_seven_columns(const uint8_t* HWY_RESTRICT padded, size_t count,
@@ -93,7 +170,7 @@ namespace {
 
 HWY_EXPORT(scale_row);
 HWY_EXPORT(sum_five_columns);
-HWY_EXPORT(sum_five_rows);
+HWY_EXPORT(mean_row);
 HWY_EXPORT(exceed_row);
 HWY_EXPORT(sum_seven_columns);
 HWY_EXPORT(most_row);
@@ -104,6 +181,9 @@ constexpr size_t kBitsRead = 64;
 
 // Pixels whose bits are whole bytes, and whole vectors.
 constexpr size_t kBitsPacked = 64;
+constexpr size_t whole_vectors(size_t width) {
+  return (width + kBitsPacked - 1) / kBitsPacked * kBitsPacked;
+}
 
 // Rows of a mask that are packed together: they stay in the first-level cache.
 size_t mask_rows(size_t width, int height) {
@@ -146,8 +226,9 @@ using CountRing = RowRing<uint8_t, kMajorityReach>;
 
 size_t mask_scratch_bytes(int width, int height) {
   const auto w = static_cast<size_t>(width);
-  const size_t bytes = 2 * w * SumRing::kRows + w * CountRing::kRows + 5 * w +
-                       (w + 2 * kMajorityReach) + mask_rows(w, height) * w + kBitsPacked +
+  const size_t whole = whole_vectors(w);
+  const size_t bytes = 2 * whole * SumRing::kRows + w * CountRing::kRows + 5 * w +
+                       (whole + 2 * kMajorityReach) + mask_rows(w, height) * w + kBitsPacked +
                        kBitsRead;
   // The next thread's begins at an even address, too.
   return bytes + bytes % 2;
@@ -159,10 +240,11 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Ga
   const auto width = static_cast<size_t>(reference.width);
   const bool lit = is_lit(gain);
   const auto take = [&scratch](size_t bytes) { return std::exchange(scratch, scratch + bytes); };
-  SumRing sums(reinterpret_cast<uint16_t*>(take(2 * width * SumRing::kRows)), width);
+  const size_t whole = whole_vectors(width);
+  SumRing sums(reinterpret_cast<uint16_t*>(take(2 * whole * SumRing::kRows)), whole);
   CountRing counts(take(width * CountRing::kRows), width);
   uint8_t* const lit_rows[3] = {take(width), take(width), take(width)};
-  uint8_t* const padded = take(width + 2 * kMajorityReach);
+  uint8_t* const padded = take(whole + 2 * kMajorityReach);
   const size_t rows_together = mask_rows(width, height);
   uint8_t* const mask = take(rows_together * width + kBitsPacked + kBitsRead);
   RowReader reader(x, reference.width, take(2 * width));
@@ -266,20 +348,17 @@ Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], c
 
 namespace {
 
-// What blur() needs for rows of a width: sums, a padded row, and the total.
+// What blur() needs for rows of a width: sums, and a padded row.
 size_t blur_scratch(size_t width) {
-  const size_t bytes = 2 * width * (SumRing::kRows + 1) + width + 2 * kMeanReach;
-  // The next thread's begins at an even address, too.
-  return bytes + bytes % 2;
+  return 2 * whole_vectors(width) * SumRing::kRows + whole_vectors(width) + 2 * kMeanReach;
 }
 
 // Rows first .. end - 1.
 void blur_rows(const uint8_t* plane, size_t width, int height, int first, int end, uint8_t* scratch,
                uint8_t* out) {
   auto* const sums = reinterpret_cast<uint16_t*>(scratch);
-  SumRing ring(sums, width);
-  uint16_t* const total = sums + width * SumRing::kRows;
-  auto* const padded = reinterpret_cast<uint8_t*>(total + width);
+  SumRing ring(sums, whole_vectors(width));
+  auto* const padded = reinterpret_cast<uint8_t*>(sums + whole_vectors(width) * SumRing::kRows);
   int next = std::max(0, first - kMeanReach);
   for (int row = first; row < end; ++row) {
     for (; next < std::min(height, row + kMeanReach + 1); ++next) {
@@ -287,9 +366,8 @@ void blur_rows(const uint8_t* plane, size_t width, int height, int first, int en
       pad_ends(width, kMeanReach, padded);
       HWY_DYNAMIC_DISPATCH(sum_five_columns)(padded, width, ring.of(next));
     }
-    HWY_DYNAMIC_DISPATCH(sum_five_rows)(ring.around(row, height).data(), width, total);
-    for (size_t x = 0; x < width; ++x)
-      out[static_cast<size_t>(row) * width + x] = static_cast<uint8_t>((total[x] + 12) / 25);
+    HWY_DYNAMIC_DISPATCH(mean_row)
+    (ring.around(row, height).data(), width, out + static_cast<size_t>(row) * width);
   }
 }
 

@@ -7,6 +7,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/residual.cpp"
 #include "core/passes/simd.h"
+// After simd.h.
+#include "core/passes/even_odd.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace qdmd {
@@ -62,35 +64,73 @@ size_t exceed(const uint8_t* const* x, const uint8_t* const* l, size_t count, ui
                 : exceed_limits<false>(x, l, count, limit, nullptr, out);
 }
 
-// Not a plain loop: compilers make no vectors of std::sqrt, which may set errno. Roots are rounded
-// correctly on every instruction set, and none of an integer up to 65535 is rounded up to the next.
-size_t norm(const uint8_t* const* x, const uint8_t* const* l, size_t count, float steps,
-            uint8_t* out) {
-  const hn::ScalableTag<float> d;
-  const hn::Rebind<int32_t, decltype(d)> d32;
-  const hn::Rebind<uint16_t, decltype(d)> d16;
-  const hn::Rebind<uint8_t, decltype(d)> d8;
-  const hn::RebindToUnsigned<decltype(d32)> d32u;
-  const auto factor = hn::Set(d, steps), most = hn::Set(d, 255.0f);
+#if HWY_TARGET == HWY_SCALAR
+size_t norm(const uint8_t* const*, const uint8_t* const*, size_t, uint8_t*) { return 0; }
+size_t norm_in_quarters(const uint8_t* const*, const uint8_t* const*, size_t, uint8_t*) {
+  return 0;
+}
+#else
+// floor(sqrt(x)). Roots are rounded correctly on every instruction set, and none of an integer up
+// to 65535 is rounded up to the next. Not a plain loop: compilers make no vectors of std::sqrt,
+// which may set errno.
+HWY_INLINE EvenOdd::V16 root(EvenOdd::V16 x) {
+  const EvenOdd::Words d16;
+  const hn::Repartition<float, decltype(d16)> d;
+  const hn::Repartition<uint32_t, decltype(d16)> d32;
+  const hn::Repartition<int32_t, decltype(d16)> d32s;
+  const auto whole = [&](hn::Vec<decltype(d32)> square) HWY_ATTR {
+    const auto level = hn::Sqrt(hn::ConvertTo(d, hn::BitCast(d32s, square)));
+    return hn::BitCast(d32, hn::ConvertTo(d32s, level));
+  };
+  const auto pairs = hn::BitCast(d32, x);
+  const auto low = whole(hn::And(pairs, hn::Set(d32, uint32_t{65535})));
+  const auto high = whole(hn::ShiftRight<16>(pairs));
+  return hn::BitCast(d16, hn::Or(low, hn::ShiftLeft<16>(high)));
+}
+
+// 2^kBits steps to a level.
+template <int kBits>
+HWY_INLINE size_t norms(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+                        uint8_t* out) {
+  using All = EvenOdd;
+  const All::Bytes d;
+  const All::Words d16;
   // Known not to change with what is written.
   const uint8_t *xr = x[0], *xg = x[1], *xb = x[2], *lr = l[0], *lg = l[1], *lb = l[2];
-  const auto square = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
-    const auto a = hn::LoadU(d8, of_x), b = hn::LoadU(d8, of_l);
-    const auto distance =
-        hn::PromoteTo(d16, hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)));
-    return hn::Mul(distance, distance);
+  const auto distance = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
+    const auto a = hn::LoadU(d, of_x), b = hn::LoadU(d, of_l);
+    return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
   };
-  size_t p = 0;
-  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+  const auto norm = [&](All::V16 r, All::V16 g, All::V16 b) HWY_ATTR {
     // Saturated sums have a norm of 255 like all above.
-    const auto sum = hn::SaturatedAdd(
-        hn::SaturatedAdd(square(xr + p, lr + p), square(xg + p, lg + p)), square(xb + p, lb + p));
-    const auto level = hn::Mul(factor, hn::Sqrt(hn::ConvertTo(d, hn::PromoteTo(d32, sum))));
-    const auto whole = hn::ConvertTo(d32, hn::Min(level, most));
-    hn::StoreU(hn::TruncateTo(d8, hn::BitCast(d32u, whole)), d8, out + p);
+    auto sum = hn::SaturatedAdd(hn::SaturatedAdd(hn::Mul(r, r), hn::Mul(g, g)), hn::Mul(b, b));
+    if constexpr (kBits > 0)
+      sum = hn::ShiftLeft<2 * kBits>(
+          hn::Min(sum, hn::Set(d16, static_cast<uint16_t>(65535 >> 2 * kBits))));
+    return root(sum);
+  };
+  const size_t lanes = hn::Lanes(d);
+  if (count < lanes) return 0;
+  for (size_t p = 0; p < count; p += lanes) {
+    // The last ones once more.
+    p = std::min(p, count - lanes);
+    const auto r = distance(xr + p, lr + p), g = distance(xg + p, lg + p),
+               b = distance(xb + p, lb + p);
+    hn::StoreU(All::joined(norm(All::even(r), All::even(g), All::even(b)),
+                           norm(All::odd(r), All::odd(g), All::odd(b))),
+               d, out + p);
   }
-  return p;
+  return count;
 }
+
+size_t norm(const uint8_t* const* x, const uint8_t* const* l, size_t count, uint8_t* out) {
+  return norms<0>(x, l, count, out);
+}
+size_t norm_in_quarters(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+                        uint8_t* out) {
+  return norms<2>(x, l, count, out);
+}
+#endif
 
 size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
   const hn::ScalableTag<uint8_t> d;
@@ -112,6 +152,7 @@ HWY_EXPORT(differ);
 HWY_EXPORT(exceed);
 HWY_EXPORT(mask_samples);
 HWY_EXPORT(norm);
+HWY_EXPORT(norm_in_quarters);
 
 }  // namespace
 
@@ -122,11 +163,12 @@ void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t
 
 void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count, uint8_t* out,
                    int steps) {
-  const auto factor = static_cast<float>(steps);
-  for (size_t p = HWY_DYNAMIC_DISPATCH(norm)(x, l, count, factor, out); p < count; ++p) {
+  size_t p = steps == 1 ? HWY_DYNAMIC_DISPATCH(norm)(x, l, count, out)
+                        : HWY_DYNAMIC_DISPATCH(norm_in_quarters)(x, l, count, out);
+  for (; p < count; ++p) {
     int sum = 0;
     for (int c = 0; c < 3; ++c) sum += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
-    const float level = factor * std::sqrt(static_cast<float>(sum));
+    const float level = static_cast<float>(steps) * std::sqrt(static_cast<float>(sum));
     out[p] = static_cast<uint8_t>(static_cast<int>(std::min(level, 255.0f)));
   }
 }

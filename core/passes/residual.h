@@ -10,7 +10,7 @@ namespace qdmd {
 void absolute_residual(const uint8_t* x, const uint8_t* l, size_t count, uint8_t* out);
 
 // out[p] = the quaternion norm of x[p] - l[p] in 1/steps level, rounded down, at most 255. x, l: R,
-// G, B; steps: 1, or another power of two.
+// G, B; steps: 1 or 4.
 void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t count, uint8_t* out,
                    int steps = 1);
 
