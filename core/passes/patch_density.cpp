@@ -15,8 +15,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Vectors of at most 32 cells or frames.
-constexpr size_t kUnit = 32;
+// Vectors of at most 16 cells or frames: grids have few whole vectors of more in a row.
+constexpr size_t kUnit = 16;
 using Steps = hn::CappedTag<uint16_t, kUnit>;
 
 constexpr size_t kR = kPatchRadius, kAlong = 2 * kR + 1;
@@ -26,7 +26,7 @@ constexpr auto kMost = static_cast<uint16_t>(kChannels * kMostDistance * kStepsP
 static_assert(kAlong * kAlong * kMost < 65536);
 
 // A row of patches' sums, with empty cells at both ends.
-constexpr size_t sums_stride(size_t cols) { return (cols + kUnit - 1) / kUnit * kUnit + 2 * kR; }
+constexpr size_t sums_stride(size_t stride) { return stride + 2 * kR; }
 
 template <class V>
 HWY_INLINE V cell_distance(V r, V g, V b, V other_r, V other_g, V other_b) {
@@ -41,57 +41,49 @@ void to_steps(const float* HWY_RESTRICT levels, size_t count, uint16_t* HWY_REST
   for (size_t i = 0; i < count; ++i) steps[i] = steps_of(levels[i]);
 }
 
-HWY_INLINE void add_alike(const uint16_t* HWY_RESTRICT alike, size_t count,
-                          float* HWY_RESTRICT density) {
-  const hn::CappedTag<float, 16> d;
-  const hn::Rebind<int32_t, decltype(d)> d32;
-  const hn::Rebind<uint16_t, decltype(d)> d16;
-  size_t i = 0;
-  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
-    const auto more = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d16, alike + i)));
-    hn::StoreU(hn::Add(hn::LoadU(d, density + i), more), d, density + i);
+// Adds a row of what is alike to a row of densities, and begins anew.
+void move_alike(uint16_t* HWY_RESTRICT alike, size_t count, float* HWY_RESTRICT density) {
+  for (size_t i = 0; i < count; ++i) {
+    density[i] += static_cast<float>(alike[i]);
+    alike[i] = 0;
   }
-  for (; i < count; ++i) density[i] += static_cast<float>(alike[i]);
 }
 
-// Adds rows [first, end) of what frames s and t have in common, in steps, to one density and, if
-// there is one, another. of_s, of_t: rows * cols steps of each channel. limit: the steps at which
-// nothing is alike. Floats hold these sums exactly. sums: for each of end - first rows
-// sums_stride(cols), 0 at first.
+// Adds rows [first, end) of what frames s and t have in common, in steps, to `alike` and, if there
+// is one, to `another`. All rows are `stride` apart, whole vectors, of which the cells behind
+// `cols` are 0. of_s, of_t: the steps of each channel. limit: the steps at which nothing is alike.
+// sums: for each of end - first rows sums_stride(stride), 0 at first.
 void add_pair(const uint16_t* of_s, const uint16_t* of_t, const uint16_t* limit, size_t rows,
-              size_t cols, size_t first, size_t end, uint16_t* sums, float* density,
-              float* another) {
+              size_t cols, size_t stride, size_t first, size_t end, uint16_t* sums, uint16_t* alike,
+              uint16_t* another) {
   const Steps d;
-  const size_t lanes = hn::Lanes(d), stride = sums_stride(cols), cells = rows * cols;
+  const size_t lanes = hn::Lanes(d), sums_step = sums_stride(stride), plane = rows * stride;
   // Down the columns first, with the last rows in registers: what is read right after it was
-  // written beside would be waited for. Lanes beyond the row's end hold the next row's cells.
+  // written beside would be waited for.
   for (size_t x = 0; x < cols; x += lanes) {
-    auto d0 = hn::Zero(d), d1 = d0, d2 = d0, d3 = d0, d4 = d0;
+    auto d0 = hn::Zero(d), d1 = d0, d2 = d0, d3 = d0, d4 = d0, sum = d0;
     for (size_t row = first > kR ? first - kR : 0; row < end + kR; ++row) {
+      sum = hn::Sub(sum, d0);
       d0 = d1, d1 = d2, d2 = d3, d3 = d4, d4 = hn::Zero(d);
       if (row < rows) {
-        const uint16_t *a = of_s + row * cols + x, *b = of_t + row * cols + x;
-        d4 = cell_distance(hn::LoadU(d, a), hn::LoadU(d, a + cells), hn::LoadU(d, a + 2 * cells),
-                           hn::LoadU(d, b), hn::LoadU(d, b + cells), hn::LoadU(d, b + 2 * cells));
+        const uint16_t *a = of_s + row * stride + x, *b = of_t + row * stride + x;
+        d4 = cell_distance(hn::LoadU(d, a), hn::LoadU(d, a + plane), hn::LoadU(d, a + 2 * plane),
+                           hn::LoadU(d, b), hn::LoadU(d, b + plane), hn::LoadU(d, b + 2 * plane));
       }
-      if (row < first + kR) continue;
-      hn::StoreU(hn::Add(hn::Add(hn::Add(d0, d1), hn::Add(d2, d3)), d4), d,
-                 sums + (row - kR - first) * stride + kR + x);
+      sum = hn::Add(sum, d4);
+      if (row >= first + kR) hn::StoreU(sum, d, sums + (row - kR - first) * sums_step + kR + x);
     }
   }
-  for (size_t row = 0; row < end - first; ++row)
-    for (size_t i = 0; i < kR; ++i) sums[row * stride + kR + cols + i] = 0;
-  for (size_t row = first; row < end; ++row) {
-    const uint16_t* of_row = sums + (row - first) * stride;
-    HWY_ALIGN uint16_t alike[kUnit];
+  for (size_t row = 0; row < end - first; ++row) {
+    const uint16_t* of_row = sums + row * sums_step;
     for (size_t x = 0; x < cols; x += lanes) {
       const auto outer = hn::Add(hn::LoadU(d, of_row + x), hn::LoadU(d, of_row + x + 4));
       const auto inner = hn::Add(hn::LoadU(d, of_row + x + 1), hn::LoadU(d, of_row + x + 3));
       const auto patch = hn::Add(hn::Add(outer, inner), hn::LoadU(d, of_row + x + 2));
-      const size_t cell = row * cols + x, count = std::min(lanes, cols - x);
-      hn::Store(hn::SaturatedSub(hn::LoadU(d, limit + cell), patch), d, alike);
-      add_alike(alike, count, density + cell);
-      if (another) add_alike(alike, count, another + cell);
+      const auto more = hn::SaturatedSub(hn::LoadU(d, limit + (first + row) * stride + x), patch);
+      const size_t at = row * stride + x;
+      hn::StoreU(hn::Add(hn::LoadU(d, alike + at), more), d, alike + at);
+      if (another) hn::StoreU(hn::Add(hn::LoadU(d, another + at), more), d, another + at);
     }
   }
 }
@@ -124,17 +116,27 @@ namespace qdmd {
 namespace {
 
 HWY_EXPORT(to_steps);
+HWY_EXPORT(move_alike);
 HWY_EXPORT(add_pair);
 HWY_EXPORT(add_patch);
 
-// Whole vectors of every instruction set.
-constexpr size_t kVector = 32;
+// Whole vectors of every instruction set, and their bytes.
+constexpr size_t kVector = 16, kAligned = kVector * sizeof(uint16_t);
 // Rows of a band at most. What it has in common with its neighbours costs little.
 constexpr int kBandRows = 12;
-// Frames that are compared with all before while they are in the first cache.
+// Frames that are compared with all before while they are in the first caches, and as many of
+// those before: what so many have in common has room in 16 bits.
 constexpr int kBlock = 8;
+static_assert(kBlock * kChannels * kSimilar * kStepsPerLevel * 25 < 65536);
 
 size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector; }
+
+// Of rows `stride` apart of a band: what two frames have in common; and that of a frame with each
+// one of a block and with all of them, and sums.
+size_t alike_of(size_t stride) { return kBandRows * stride; }
+size_t scratch_of(size_t stride) {
+  return (kBlock + 1) * alike_of(stride) + kBandRows * (stride + 2 * kPatchRadius);
+}
 
 }  // namespace
 
@@ -144,61 +146,94 @@ PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count
                                           static_cast<int>(pool->threads())))),
       // Threads touch what is theirs.
       steps_(std::make_unique_for_overwrite<uint16_t[]>(
-          static_cast<size_t>(count) * kChannels * grid.cells() + kVector)),
-      limit_(grid.cells() + kVector),
-      sums_(sums_size() * pool->threads()) {
+          static_cast<size_t>(count) * kChannels * plane() + kVector)),
+      limit_(plane()),
+      scratch_(scratch_size() * pool->threads()) {
+  const auto cols = static_cast<size_t>(grid_.cols), stride = round_up(cols);
+  first_ = steps_.get();
+  while (reinterpret_cast<uintptr_t>(first_) % kAligned != 0) ++first_;
   pool->run(static_cast<size_t>(count), [&](size_t t) {
     // The channels lie one after another in both.
-    HWY_DYNAMIC_DISPATCH(to_steps)
-    (frames.plane(static_cast<int>(t), 0), kChannels * grid_.cells(),
-     steps_.get() + t * kChannels * grid_.cells());
+    const float* from = frames.plane(static_cast<int>(t), 0);
+    uint16_t* to = first_ + t * kChannels * plane();
+    for (int row = 0; row < kChannels * grid_.rows; ++row, from += cols, to += stride) {
+      HWY_DYNAMIC_DISPATCH(to_steps)(from, cols, to);
+      std::fill(to + cols, to + stride, uint16_t{0});
+    }
   });
-  std::fill_n(steps_.get() + static_cast<size_t>(count) * kChannels * grid_.cells(), kVector,
-              uint16_t{0});
-  size_t cell = 0;
   for (int row = 0; row < grid.rows; ++row)
-    for (int col = 0; col < grid.cols; ++col, ++cell)
-      limit_[cell] =
+    for (int col = 0; col < grid.cols; ++col)
+      limit_[static_cast<size_t>(row) * stride + static_cast<size_t>(col)] =
           static_cast<uint16_t>(kChannels * kSimilar * kStepsPerLevel *
                                 static_cast<float>(patch_cells(grid, row, col, kPatchRadius)));
 }
 
-uint64_t PatchFrames::bytes(const Grid& grid, uint64_t count) {
-  return sizeof(uint16_t) * grid.cells() * (count * kChannels + 1);
+uint64_t PatchFrames::bytes(const Grid& grid, uint64_t count, int threads) {
+  const uint64_t stride = round_up(static_cast<size_t>(grid.cols)),
+                 plane = static_cast<uint64_t>(grid.rows) * stride;
+  return sizeof(uint16_t) * (plane * (count * kChannels + 1) + kVector +
+                             static_cast<uint64_t>(threads) * scratch_of(stride));
 }
 
-size_t PatchFrames::sums_size() const {
-  return kBandRows * (round_up(static_cast<size_t>(grid_.cols)) + 2 * kPatchRadius);
+size_t PatchFrames::plane() const {
+  return static_cast<size_t>(grid_.rows) * round_up(static_cast<size_t>(grid_.cols));
+}
+
+size_t PatchFrames::scratch_size() const {
+  return scratch_of(round_up(static_cast<size_t>(grid_.cols)));
 }
 
 void PatchFrames::density(int count, Pool* pool, float* density) {
-  const size_t cells = grid_.cells(), cols = static_cast<size_t>(grid_.cols);
-  const auto of = [&](int t) { return density + static_cast<size_t>(t) * cells; };
+  const auto cols = static_cast<size_t>(grid_.cols), stride = round_up(cols);
+  const size_t cells = grid_.cells(), size = alike_of(stride);
   for_bands(*pool, grid_.rows, bands_, [&](int first_row, int row_count, size_t worker) {
-    const auto first = static_cast<size_t>(first_row), end = first + static_cast<size_t>(row_count);
-    uint16_t* sums = sums_.data() + worker * sums_size();
-    for (int t = 0; t < count; ++t) std::fill_n(of(t) + first * cols, (end - first) * cols, 0.0f);
+    const auto first = static_cast<size_t>(first_row), rows = static_cast<size_t>(row_count);
+    uint16_t* const of_other = scratch_.data() + worker * scratch_size();
+    uint16_t* const of_block = of_other + size;
+    uint16_t* const sums = of_block + kBlock * size;
+    const auto of = [&](int t) { return density + static_cast<size_t>(t) * cells + first * cols; };
+    const auto in_block = [&](int t) { return of_block + static_cast<size_t>(t % kBlock) * size; };
+    const auto move = [&](uint16_t* alike, int t) {
+      for (size_t row = 0; row < rows; ++row) HWY_DYNAMIC_DISPATCH(move_alike)
+      (alike + row * stride, cols, of(t) + row * cols);
+    };
+    for (int t = 0; t < count; ++t) std::fill_n(of(t), rows * cols, 0.0f);
+    std::fill(of_other, sums, uint16_t{0});
     for (int block = 0; block < count; block += kBlock) {
       const int last = std::min(count, block + kBlock);
-      for (int s = 0; s < last; ++s)
-        for (int t = std::max(s, block); t < last; ++t) HWY_DYNAMIC_DISPATCH(add_pair)
-      (steps(s), steps(t), limit_.data(), static_cast<size_t>(grid_.rows), cols, first, end, sums,
-       of(s), s == t ? nullptr : of(t));
+      for (int s = 0; s < last; ++s) {
+        for (int t = std::max(s, block); t < last; ++t)
+          add_common(s, t, first, first + rows, sums, of_other, s == t ? nullptr : in_block(t));
+        move(of_other, s);
+        if ((s + 1) % kBlock != 0 && s + 1 < last) continue;
+        for (int t = block; t < last; ++t) move(in_block(t), t);
+      }
     }
     for (int t = 0; t < count; ++t)
-      for (size_t cell = first * cols; cell < end * cols; ++cell)
-        of(t)[cell] /= static_cast<float>(limit_[cell]);
+      for (size_t row = 0; row < rows; ++row)
+        for (size_t col = 0; col < cols; ++col)
+          of(t)[row * cols + col] /= static_cast<float>(limit_[(first + row) * stride + col]);
   });
 }
 
 void PatchFrames::alike(int s, int t, int part, size_t worker, float* alike) {
-  const size_t first = first_cell(part), end = first_cell(part + 1);
+  const auto cols = static_cast<size_t>(grid_.cols), stride = round_up(cols);
+  const size_t first = first_cell(part) / cols, end = first_cell(part + 1) / cols;
+  uint16_t* const common = scratch_.data() + worker * scratch_size();
+  std::fill_n(common, alike_of(stride), uint16_t{0});
+  add_common(s, t, first, end, common + (kBlock + 1) * alike_of(stride), common, nullptr);
+  for (size_t row = first; row < end; ++row)
+    for (size_t col = 0; col < cols; ++col)
+      alike[row * cols + col] = static_cast<float>(common[(row - first) * stride + col]) /
+                                static_cast<float>(limit_[row * stride + col]);
+}
+
+void PatchFrames::add_common(int s, int t, size_t first, size_t end, uint16_t* sums,
+                             uint16_t* alike, uint16_t* another) const {
   const auto cols = static_cast<size_t>(grid_.cols);
-  std::fill(alike + first, alike + end, 0.0f);
   HWY_DYNAMIC_DISPATCH(add_pair)
-  (steps(s), steps(t), limit_.data(), static_cast<size_t>(grid_.rows), cols, first / cols,
-   end / cols, sums_.data() + worker * sums_size(), alike, nullptr);
-  for (size_t cell = first; cell < end; ++cell) alike[cell] /= static_cast<float>(limit_[cell]);
+  (steps(s), steps(t), limit_.data(), static_cast<size_t>(grid_.rows), cols, round_up(cols), first,
+   end, sums, alike, another);
 }
 
 uint64_t patch_distance_bytes(const Grid& grid, uint64_t count) {

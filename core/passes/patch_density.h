@@ -38,7 +38,7 @@ inline int patch_cells(const Grid& grid, int row, int col, int radius = kNearRad
 class PatchFrames {
  public:
   PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
-  static uint64_t bytes(const Grid& grid, uint64_t count);
+  static uint64_t bytes(const Grid& grid, uint64_t count, int threads);
 
   // density[t * cells + cell] = the sum over frames s < count of how alike s and t are.
   void density(int count, Pool* pool, float* density);
@@ -54,17 +54,21 @@ class PatchFrames {
 
  private:
   const uint16_t* steps(int frame) const {
-    return steps_.get() + static_cast<size_t>(frame) * kChannels * grid_.cells();
+    return first_ + static_cast<size_t>(frame) * kChannels * plane();
   }
-  size_t sums_size() const;
+  size_t plane() const;
+  size_t scratch_size() const;
+  void add_common(int s, int t, size_t first, size_t end, uint16_t* sums, uint16_t* alike,
+                  uint16_t* another) const;
 
   Grid grid_;
   int bands_;
-  // Readable up to whole vectors behind the last cell. limit_: of each cell, the patch's steps at
-  // which nothing is alike.
+  // Rows are whole vectors, and begin at one. limit_: of each cell, the patch's steps at which
+  // nothing is alike.
   std::unique_ptr<uint16_t[]> steps_;
+  uint16_t* first_ = nullptr;
   std::vector<uint16_t> limit_;
-  std::vector<uint16_t> sums_;  // for each thread
+  std::vector<uint16_t> scratch_;  // for each thread
 };
 
 // distance[cell * count + t]: the steps that the patches around the cell in frame t and in frame

@@ -109,7 +109,7 @@ TEST_P(PartsMemory, OfAWindow) {
 
     const GridFrames frames(grid, snapshots);
     expect(
-        "PatchFrames", PatchFrames::bytes(grid, count),
+        "PatchFrames", PatchFrames::bytes(grid, count, 1),
         [&] { PatchFrames part(grid, frames, snapshots, &pool); }, kLittle);
     const std::vector<int> reference(grid.cells(), 0);
     expect(

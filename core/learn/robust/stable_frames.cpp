@@ -229,7 +229,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads) {
   const uint64_t rooms = sizeof(float) * static_cast<uint64_t>(threads) * grid.cells();
   const uint64_t densities = sizeof(float) * looks * grid.cells();
-  return std::max({densities + PatchFrames::bytes(grid, looks) + rooms,
+  return std::max({densities + PatchFrames::bytes(grid, looks, threads) + rooms,
                    densities + ClutterColours::bytes(grid, looks, threads),
                    patch_distance_bytes(grid, looks)});
 }
