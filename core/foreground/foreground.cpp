@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <mutex>
 #include <numeric>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "core/passes/planes.h"
 #include "core/passes/read_samples.h"
@@ -44,9 +44,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                                            const Band& band) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
-  constexpr double kBinsPerLevel = 8;
-  // The largest quaternion norm of a difference is 255 sqrt(3).
-  constexpr auto kBins = static_cast<size_t>(442 * kBinsPerLevel);
+  constexpr double kBinsPerLevel = kResidualSteps;
+  constexpr size_t kBins = kResidualBeyond;
   // All pixels by distance, and those beyond their limits.
   std::array<int64_t, 2 * kBins> counts{};
   const std::span histogram = std::span(counts).first(kBins),
@@ -62,13 +61,14 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
   const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
   const size_t step = std::max<size_t>(1, (runs + kRunsPerFrame - 1) / kRunsPerFrame);
-  std::mutex mutex;  // of the counts
+  // Of each thread: pixels within their limits, and those beyond.
+  std::vector<int64_t> of_threads(2 * kBins * pool.threads());
   for (int i = 0; i < frames; ++i) {
     const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
     model.set_time(t);
     // Other frames look at other runs.
     const size_t first_run = static_cast<size_t>(i) % step;
-    pool.run((runs - std::min(runs, first_run) + step - 1) / step, [&](size_t part) {
+    pool.run((runs - std::min(runs, first_run) + step - 1) / step, [&](size_t part, size_t worker) {
       const size_t run = first_run + part * step;
       const size_t begin = std::max(run * kMaxRun, own),
                    end = std::min({(run + 1) * kMaxRun, pixels, own_end});
@@ -83,28 +83,16 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       uint8_t room[kChannels][kMaxRun];
       for (int c = 0; c < kChannels; ++c)
         x[c] = read_samples(snapshots, t, c, first, count, room[c]);
-      // A run has fewer pixels than 16 bits can count.
-      std::array<uint16_t, kBins> all{}, beyond{};
-      size_t bins = 0;
-      for (size_t p = 0; p < count; ++p) {
-        if (!counted[p]) continue;
-        int squared = 0;
-        for (int c = 0; c < kChannels; ++c) {
-          const int difference = x[c][p] - background.level[c][p];
-          squared += difference * difference;
-        }
-        const double norm = std::sqrt(squared);
-        const auto bin = static_cast<size_t>(norm * kBinsPerLevel);
-        bins = std::max(bins, bin + 1);
-        ++all[bin];
-        if (!limits || squared > limits[first + p] * limits[first + p]) ++beyond[bin];
-      }
-      const std::lock_guard lock(mutex);
-      for (size_t bin = 0; bin < bins; ++bin) {
-        histogram[bin] += all[bin];
-        beyond_limits[bin] += beyond[bin];
-      }
+      uint16_t steps[kMaxRun];
+      residual_steps(x, background.rows, count, limits ? limits + first : nullptr, steps);
+      int64_t* const mine = of_threads.data() + worker * 2 * kBins;
+      for (size_t p = 0; p < count; ++p) mine[steps[p]] += counted[p];
     });
+  }
+  for (size_t i = 0; i < of_threads.size(); ++i) {
+    const size_t bin = i % (2 * kBins);
+    histogram[bin % kBins] += of_threads[i];
+    if (bin >= kBins) beyond_limits[bin - kBins] += of_threads[i];
   }
 
   if (!whole) band.team()->sum(Talk::statistics, counts);

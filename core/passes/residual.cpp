@@ -132,6 +132,38 @@ size_t norm_in_quarters(const uint8_t* const* x, const uint8_t* const* l, size_t
 }
 #endif
 
+// From pixel p on, as many as fill whole vectors; returns the first that is left.
+template <class D>
+HWY_INLINE size_t some_steps(D d, const uint8_t* const* x, const uint8_t* const* l, size_t p,
+                             size_t count, const uint8_t* limits, uint16_t* out) {
+  const hn::Rebind<int32_t, D> d32;
+  const hn::Rebind<uint16_t, D> d16;
+  const hn::Rebind<uint8_t, D> d8;
+  const auto load = [&](const uint8_t* from)
+                        HWY_ATTR { return hn::PromoteTo(d32, hn::LoadU(d8, from)); };
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    auto squared = hn::Zero(d32);
+    for (size_t c = 0; c < 3; ++c) {
+      const auto distance = hn::Sub(load(x[c] + p), load(l[c] + p));
+      squared = hn::Add(squared, hn::Mul(distance, distance));
+    }
+    const auto limit = limits ? load(limits + p) : hn::Zero(d32);
+    const auto beyond = hn::VecFromMask(d32, hn::Gt(squared, hn::Mul(limit, limit)));
+    // None of an integer up to 3 x 255^2 is rounded up to the next step.
+    const auto steps = hn::Mul(hn::Sqrt(hn::ConvertTo(d, squared)),
+                               hn::Set(d, static_cast<float>(kResidualSteps)));
+    const auto more = hn::And(beyond, hn::Set(d32, kResidualBeyond));
+    hn::StoreU(hn::DemoteTo(d16, hn::Add(hn::ConvertTo(d32, steps), more)), d16, out + p);
+  }
+  return p;
+}
+
+void steps(const uint8_t* const* x, const uint8_t* const* l, size_t count, const uint8_t* limits,
+           uint16_t* out) {
+  const size_t p = some_steps(hn::ScalableTag<float>(), x, l, 0, count, limits, out);
+  some_steps(hn::CappedTag<float, 1>(), x, l, p, count, limits, out);
+}
+
 size_t mask_samples(const uint8_t* x, const uint8_t* mask, size_t count, uint8_t* out) {
   const hn::ScalableTag<uint8_t> d;
   size_t p = 0;
@@ -153,6 +185,7 @@ HWY_EXPORT(exceed);
 HWY_EXPORT(mask_samples);
 HWY_EXPORT(norm);
 HWY_EXPORT(norm_in_quarters);
+HWY_EXPORT(steps);
 
 }  // namespace
 
@@ -171,6 +204,11 @@ void residual_norm(const uint8_t* const x[3], const uint8_t* const l[3], size_t 
     const float level = static_cast<float>(steps) * std::sqrt(static_cast<float>(sum));
     out[p] = static_cast<uint8_t>(static_cast<int>(std::min(level, 255.0f)));
   }
+}
+
+void residual_steps(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,
+                    const uint8_t* limits, uint16_t* out) {
+  HWY_DYNAMIC_DISPATCH(steps)(x, l, count, limits, out);
 }
 
 void foreground_mask(const uint8_t* const x[3], const uint8_t* const l[3], size_t count,

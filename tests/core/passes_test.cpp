@@ -384,6 +384,64 @@ TEST(ResidualNorm, OfAnyCount) {
   });
 }
 
+int whole_steps(int square) {
+  return static_cast<int>(std::floor(kResidualSteps * std::sqrt(static_cast<double>(square))));
+}
+
+// Also where it is at its limit, which it does not exceed.
+TEST(ResidualSteps, OfEveryNormAndLimit) {
+  on_every_target([] {
+    BeforeTheEdge<uint8_t> red(256), green(256), blue(256), zero(256), limit(256);
+    BeforeTheEdge<uint16_t> steps(256), unlimited(256);
+    std::fill(zero.begin(), zero.end(), static_cast<uint8_t>(0));
+    for (size_t p = 0; p < 256; ++p) blue[p] = static_cast<uint8_t>(p);
+    const uint8_t* const x[3] = {red.data(), zero.data(), blue.data()};
+    const uint8_t* const l[3] = {zero.data(), green.data(), zero.data()};
+    for (int r = 0; r < 256; ++r) {
+      std::fill(red.begin(), red.end(), static_cast<uint8_t>(r));
+      for (int g = 0; g <= r; ++g) {
+        std::fill(green.begin(), green.end(), static_cast<uint8_t>(g));
+        for (int b = 0; b < 256; ++b)
+          limit[static_cast<size_t>(b)] = static_cast<uint8_t>(whole_root(r * r + g * g + b * b));
+        residual_steps(x, l, 256, limit.data(), steps.data());
+        residual_steps(x, l, 256, nullptr, unlimited.data());
+        for (int b = 0; b < 256; ++b) {
+          const auto at = static_cast<size_t>(b);
+          const int square = r * r + g * g + b * b, whole = whole_steps(square);
+          const bool beyond = square > limit[at] * limit[at];
+          if (steps[at] != whole + (beyond ? kResidualBeyond : 0) ||
+              unlimited[at] != whole + (square > 0 ? kResidualBeyond : 0))
+            FAIL() << square << " beyond " << int(limit[at]);
+        }
+      }
+    }
+    EXPECT_LT(whole_steps(3 * 255 * 255), kResidualBeyond);
+  });
+}
+
+TEST(ResidualSteps, OfAnyCount) {
+  std::mt19937 rng(209);
+  on_every_target([&] {
+    for (size_t count : kCounts) {
+      std::array<std::unique_ptr<BeforeTheEdge<uint8_t>>, 7> planes;
+      for (auto& plane : planes) {
+        plane = std::make_unique<BeforeTheEdge<uint8_t>>(count);
+        for (uint8_t& sample : *plane) sample = random_byte(rng);
+      }
+      BeforeTheEdge<uint16_t> steps(count);
+      const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
+      const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
+      residual_steps(x, l, count, planes[6]->data(), steps.data());
+      for (size_t p = 0; p < count; ++p) {
+        int square = 0;
+        for (size_t c = 0; c < 3; ++c) square += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+        const int limit = (*planes[6])[p];
+        ASSERT_EQ(steps[p], whole_steps(square) + (square > limit * limit ? kResidualBeyond : 0));
+      }
+    }
+  });
+}
+
 // Pixels of three channels, frame and background.
 struct Pixels {
   std::vector<std::array<uint8_t, 6>> all;
