@@ -375,6 +375,12 @@ void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const 
   SampleFinder samples(x, reference.width);
   size_t sample = 0;
   for (int row = rows.first; row < rows.end; row += rows.step) {
+    // The hardware does not foresee rows that are far apart.
+    if (row + rows.step < rows.end) {
+      samples.seek(row + rows.step);
+      for (size_t c = 0; c < kChannels; ++c)
+        for (size_t i = 0; i < samples.row_size(c); i += 64) hwy::Prefetch(samples.row(c) + i);
+    }
     samples.seek(row);
     for (int col = 0; col < reference.width; col += rows.step, ++sample) {
       const auto p = static_cast<size_t>(row) * static_cast<size_t>(reference.width) +

@@ -59,11 +59,13 @@ class SampleFinder {
                                                        static_cast<size_t>(shape.chroma_width())
                                                  : static_cast<size_t>(row) * width_);
   }
-  uint8_t at(size_t c, size_t col) const {
-    return row_[c][c > 0 && picture_.shape.is_shared() ? col / 2 : col];
-  }
+  const uint8_t* row(size_t c) const { return row_[c]; }
+  size_t row_size(size_t c) const { return is_shared(c) ? (width_ + 1) / 2 : width_; }
+  uint8_t at(size_t c, size_t col) const { return row_[c][is_shared(c) ? col / 2 : col]; }
 
  private:
+  bool is_shared(size_t c) const { return c > 0 && picture_.shape.is_shared(); }
+
   const KeptPicture& picture_;
   size_t width_;
   const uint8_t* row_[kChannels] = {};
