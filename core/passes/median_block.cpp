@@ -87,6 +87,8 @@ void copy_row(const uint8_t* from, size_t count, uint8_t* to) {
     copy(integral_constant<size_t, 8>());
   else if (count >= 4)
     copy(integral_constant<size_t, 4>());
+  else if (count >= 2)
+    copy(integral_constant<size_t, 2>());
   else
     for (size_t i = 0; i < count; ++i) to[i] = from[i];
 }
@@ -183,8 +185,10 @@ void median_block(const MedianBlock& block, const MedianFrame* frames, size_t co
   const BlockLayout layout(block, std::all_of(frames, frames + count, [](const MedianFrame& frame) {
                              return frame.is_shared;
                            }));
-  const size_t pixels = padded(block.width * block.height), all = padded(layout.all());
-  // Norms are of whole vectors, too.
+  // Norms are of whole vectors, too: of small ones.
+  constexpr size_t kFew = 16;
+  const size_t pixels = (block.width * block.height + kFew - 1) / kFew * kFew,
+               all = padded(layout.all());
   const size_t read = std::max(all, layout.begin(kChannels - 1) + pixels);
   for (size_t i = 0; i < count; ++i) {
     for (size_t c = 0; c < kChannels; ++c) layout.take(frames[i], c, samples[i]);
@@ -217,7 +221,7 @@ void median_block(const MedianBlock& block, const MedianFrame* frames, size_t co
     residual_norm(x, middle, pixels, sorted[i], 4);
   }
   // One frame says nothing of a spread: its distance is 0.
-  HWY_DYNAMIC_DISPATCH(take_median)(network, pixels, sorted, median);
+  HWY_DYNAMIC_DISPATCH(take_median)(network, padded(pixels), sorted, median);
   scatter(median, spread);
 }
 

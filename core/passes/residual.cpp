@@ -88,6 +88,29 @@ HWY_INLINE EvenOdd::V16 root(EvenOdd::V16 x) {
   return hn::BitCast(d16, hn::Or(low, hn::ShiftLeft<16>(high)));
 }
 
+// 2^kBits steps to a level, of fewer pixels than a vector of bytes has.
+template <int kBits>
+HWY_INLINE size_t few_norms(const uint8_t* const* x, const uint8_t* const* l, size_t count,
+                            uint8_t* out) {
+  const hn::ScalableTag<float> d;
+  const hn::Rebind<int32_t, decltype(d)> d32;
+  const hn::Rebind<uint8_t, decltype(d)> d8;
+  const auto square = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
+    const auto distance =
+        hn::Sub(hn::PromoteTo(d32, hn::LoadU(d8, of_x)), hn::PromoteTo(d32, hn::LoadU(d8, of_l)));
+    return hn::Mul(distance, distance);
+  };
+  const auto steps = hn::Set(d, static_cast<float>(1 << kBits)), most = hn::Set(d, 255.0f);
+  size_t p = 0;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    const auto sum = hn::Add(hn::Add(square(x[0] + p, l[0] + p), square(x[1] + p, l[1] + p)),
+                             square(x[2] + p, l[2] + p));
+    const auto level = hn::Min(hn::Mul(steps, hn::Sqrt(hn::ConvertTo(d, sum))), most);
+    hn::StoreU(hn::DemoteTo(d8, hn::ConvertTo(d32, level)), d8, out + p);
+  }
+  return p;
+}
+
 // 2^kBits steps to a level.
 template <int kBits>
 HWY_INLINE size_t norms(const uint8_t* const* x, const uint8_t* const* l, size_t count,
@@ -110,7 +133,7 @@ HWY_INLINE size_t norms(const uint8_t* const* x, const uint8_t* const* l, size_t
     return root(sum);
   };
   const size_t lanes = hn::Lanes(d);
-  if (count < lanes) return 0;
+  if (count < lanes) return few_norms<kBits>(x, l, count, out);
   for (size_t p = 0; p < count; p += lanes) {
     // The last ones once more.
     p = std::min(p, count - lanes);
