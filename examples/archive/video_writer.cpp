@@ -40,7 +40,9 @@ void push(const PipelinePtr& pipeline, const ElementPtr& source, GstBuffer* buff
 
 // Slices would be threads' work: a process has one core.
 const char* const kLossless = "avenc_ffv1 ! matroskamux";
-const char* const kPicture = "pngenc snapshot=true";
+// One process encodes, and the others wait for it: files are 4 % larger than with the encoder's own
+// level, in two thirds of its time.
+const char* const kPicture = "pngenc snapshot=true compression-level=2";
 
 VideoWriter::VideoWriter(const std::string& path, const VideoShape& shape,
                          const std::string& encoder)
