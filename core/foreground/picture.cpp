@@ -94,6 +94,11 @@ class Writer {
     const bool greys = task.output == Output::mask || task.output == Output::foreground;
     for (int c = 0; c < 3; ++c)
       is_constant_[c] = !shape_.has(c) || (greys && levels.black[c] == levels.white[c]);
+    // Once for all rows, but for those that are made where they belong.
+    for (int c = 0; c < 3; ++c)
+      if (is_constant_[c] && !is_made_in_place(c))
+        for (auto& row : room_.shown)
+          std::memset(row[c], levels.black[c], std::min(kMaxRun, static_cast<size_t>(out.width)));
   }
 
   void write(const Block& block) {
@@ -101,8 +106,7 @@ class Writer {
     for (int r = 0; r < block.rows; ++r) {
       const int y = block.y + r;
       for (int c = 0; c < 3; ++c)
-        rows_[r][c] = shape_.is_direct(c) && !shape_.is_shared(c) ? shape_.sample(c, y, block.left)
-                                                                  : room_.shown[r][c];
+        rows_[r][c] = is_made_in_place(c) ? shape_.sample(c, y, block.left) : room_.shown[r][c];
       make_row(r, block);
       const uint8_t* alpha =
           out_.alpha ? make_alpha(r, first_pixel(block, r), block.count) : nullptr;
@@ -115,6 +119,7 @@ class Writer {
   }
 
  private:
+  bool is_made_in_place(int c) const { return shape_.is_direct(c) && !shape_.is_shared(c); }
   size_t first_pixel(const Block& block, int r) const {
     return static_cast<size_t>(block.y + r) * static_cast<size_t>(out_.width) + block.left;
   }
@@ -125,7 +130,7 @@ class Writer {
     uint8_t* const* const to = rows_[r];
     const uint8_t* const mask = task_.mask ? task_.mask + first : nullptr;
     for (int c = 0; c < 3; ++c)
-      if (shape_.has(c) && is_constant_[c]) std::memset(to[c], levels_.black[c], count);
+      if (is_constant_[c] && is_made_in_place(c)) std::memset(to[c], levels_.black[c], count);
     switch (task_.output) {
       case Output::background: {
         const uint8_t* level[3];

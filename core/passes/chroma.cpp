@@ -6,6 +6,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/chroma.cpp"
 #include "core/passes/simd.h"
+// After simd.h.
+#include "core/passes/even_odd.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace qdmd {
@@ -167,17 +169,42 @@ void interleave_row(const uint8_t* first, const uint8_t* second, size_t count, u
   for (size_t k = 0; k < count; ++k) out[2 * k] = first[k], out[2 * k + 1] = second[k];
 }
 
-// Plain loops, which the compiler makes vectors of.
-void fit_row(const uint8_t* HWY_RESTRICT x, uint8_t black, uint8_t white, size_t count,
-             uint8_t* HWY_RESTRICT out) {
+// From sample p on.
+void fit_some(const uint8_t* x, uint8_t black, uint8_t white, size_t p, size_t count,
+              uint8_t* out) {
   const auto range = static_cast<uint16_t>(white - black);
-  for (size_t p = 0; p < count; ++p) {
+  for (; p < count; ++p) {
     const auto sum = static_cast<uint16_t>(x[p] * range + 127);
     // sum / 255
     out[p] = static_cast<uint8_t>(black + (static_cast<uint16_t>(sum + 1 + (sum >> 8)) >> 8));
   }
 }
 
+#if HWY_TARGET == HWY_SCALAR
+void fit_row(const uint8_t* x, uint8_t black, uint8_t white, size_t count, uint8_t* out) {
+  fit_some(x, black, white, 0, count, out);
+}
+#else
+void fit_row(const uint8_t* x, uint8_t black, uint8_t white, size_t count, uint8_t* out) {
+  const EvenOdd::Bytes d;
+  const EvenOdd::Words d16;
+  const auto range = hn::Set(d16, static_cast<uint16_t>(white - black));
+  const auto fit = [&](EvenOdd::V16 level) HWY_ATTR {
+    const auto sum = hn::Add(hn::Mul(level, range), hn::Set(d16, uint16_t{127}));
+    const auto more = hn::Add(hn::ShiftRight<8>(sum), hn::Set(d16, uint16_t{1}));
+    return hn::ShiftRight<8>(hn::Add(sum, more));
+  };
+  size_t p = 0;
+  for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
+    const auto level = hn::LoadU(d, x + p);
+    const auto fitted = EvenOdd::joined(fit(EvenOdd::even(level)), fit(EvenOdd::odd(level)));
+    hn::StoreU(hn::Add(fitted, hn::Set(d, black)), d, out + p);
+  }
+  fit_some(x, black, white, p, count, out);
+}
+#endif
+
+// Plain loops, which the compiler makes vectors of.
 void residual_row(const uint8_t* HWY_RESTRICT x, const uint8_t* HWY_RESTRICT l, uint8_t black,
                   uint8_t white, size_t count, uint8_t* HWY_RESTRICT out) {
   for (size_t p = 0; p < count; ++p) {
