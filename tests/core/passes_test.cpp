@@ -371,14 +371,21 @@ TEST(ResidualNorm, OfAnyCount) {
         plane = std::make_unique<BeforeTheEdge<uint8_t>>(count);
         for (uint8_t& sample : *plane) sample = random_byte(rng);
       }
-      BeforeTheEdge<uint8_t> norm(count);
-      const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
-      const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
-      residual_norm(x, l, count, norm.data());
-      for (size_t p = 0; p < count; ++p) {
-        int square = 0;
-        for (size_t c = 0; c < 3; ++c) square += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
-        ASSERT_EQ(norm[p], whole_root(square));
+      // As far apart as any, and so near that quarters of levels do not saturate.
+      for (int step : {1, 16}) {
+        BeforeTheEdge<uint8_t> norm(count), quarters(count);
+        for (auto& plane : planes)
+          for (uint8_t& sample : *plane) sample = static_cast<uint8_t>(sample / step);
+        const uint8_t* const x[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
+        const uint8_t* const l[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
+        residual_norm(x, l, count, norm.data());
+        residual_norm(x, l, count, quarters.data(), 4);
+        for (size_t p = 0; p < count; ++p) {
+          int square = 0;
+          for (size_t c = 0; c < 3; ++c) square += (x[c][p] - l[c][p]) * (x[c][p] - l[c][p]);
+          ASSERT_EQ(norm[p], whole_root(square));
+          ASSERT_EQ(quarters[p], whole_root(16 * square));
+        }
       }
     }
   });
