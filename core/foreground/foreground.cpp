@@ -34,6 +34,9 @@ void touch(const uint8_t* mask, size_t count, uint8_t* out) {
   for (size_t p = 0; p < count; ++p) out[p] = mask[p] ? 255 : 0;
 }
 
+// Of a histogram of distances: its bins, and counts of pixels within their limits and beyond.
+constexpr size_t kBins = kResidualBeyond, kCounts = 2 * kBins;
+
 }  // namespace
 
 double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
@@ -45,9 +48,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = kResidualSteps;
-  constexpr size_t kBins = kResidualBeyond;
   // All pixels by distance, and those beyond their limits.
-  std::array<int64_t, 2 * kBins> counts{};
+  std::array<int64_t, kCounts> counts{};
   const std::span histogram = std::span(counts).first(kBins),
                   beyond_limits = std::span(counts).last(kBins);
   const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
@@ -61,8 +63,10 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
   const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
   const size_t step = std::max<size_t>(1, (runs + kRunsPerFrame - 1) / kRunsPerFrame);
-  // Of each thread: pixels within their limits, and those beyond.
-  std::vector<int64_t> of_threads(2 * kBins * pool.threads());
+  // Of each thread, in one frame: pixels within their limits, and those beyond. That is less than a
+  // solve takes, which is over.
+  static_assert(kRunsPerFrame * kMaxRun < 65536);
+  std::vector<uint16_t> of_threads(kCounts * pool.threads());
   for (int i = 0; i < frames; ++i) {
     const int t = frames == 1 ? 0 : i * (snapshots.size() - 1) / (frames - 1);
     model.set_time(t);
@@ -85,14 +89,19 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
         x[c] = read_samples(snapshots, t, c, first, count, room[c]);
       uint16_t steps[kMaxRun];
       residual_steps(x, background.rows, count, limits ? limits + first : nullptr, steps);
-      int64_t* const mine = of_threads.data() + worker * 2 * kBins;
-      for (size_t p = 0; p < count; ++p) mine[steps[p]] += counted[p];
+      uint16_t* const mine = of_threads.data() + worker * kCounts;
+      for (size_t p = 0; p < count; ++p)
+        mine[steps[p]] = static_cast<uint16_t>(mine[steps[p]] + counted[p]);
     });
-  }
-  for (size_t i = 0; i < of_threads.size(); ++i) {
-    const size_t bin = i % (2 * kBins);
-    histogram[bin % kBins] += of_threads[i];
-    if (bin >= kBins) beyond_limits[bin - kBins] += of_threads[i];
+    for (size_t of_thread = 0; of_thread < of_threads.size(); of_thread += kCounts) {
+      uint16_t* const within = of_threads.data() + of_thread;
+      const uint16_t* const beyond = within + kBins;
+      for (size_t bin = 0; bin < kBins; ++bin) {
+        histogram[bin] += within[bin] + beyond[bin];
+        beyond_limits[bin] += beyond[bin];
+      }
+      std::fill_n(within, kCounts, uint16_t{0});
+    }
   }
 
   if (!whole) band.team()->sum(Talk::statistics, counts);

@@ -2,6 +2,8 @@
 // would take longer than the sums.
 // After simd.h, once for each instruction set: no include guard.
 
+#include <bit>
+
 HWY_BEFORE_NAMESPACE();
 namespace qdmd {
 namespace HWY_NAMESPACE {
@@ -9,6 +11,8 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET != HWY_SCALAR
+// The first byte in memory is the lowest.
+static_assert(std::endian::native == std::endian::little);
 struct EvenOdd {
   using Bytes = hn::ScalableTag<uint8_t>;
   using Words = hn::Repartition<uint16_t, Bytes>;

@@ -23,7 +23,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Plain loops over one row, which the compiler makes vectors of for each instruction set.
+// Passes over one row. What is a plain loop, the compiler makes vectors of for each instruction
+// set.
 
 void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
                uint8_t* HWY_RESTRICT out) {

@@ -127,12 +127,13 @@ constexpr int kBandRows = 12;
 // Frames that are compared with all before while they are in the first caches, and as many of
 // those before: what so many have in common has room in 16 bits.
 constexpr int kBlock = 8;
-static_assert(kBlock * kChannels * kSimilar * kStepsPerLevel * 25 < 65536);
+constexpr int kPatchCells = (2 * kPatchRadius + 1) * (2 * kPatchRadius + 1);
+static_assert(kBlock * kChannels * kSimilar * kStepsPerLevel * kPatchCells < 65536);
 
 size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector; }
 
-// Of rows `stride` apart of a band: what two frames have in common; and that of a frame with each
-// one of a block and with all of them, and sums.
+// Samples for a band whose rows are `stride` apart: what two frames have in common; and all that a
+// thread needs, which is that of each frame of a block, and of another one, and sums.
 size_t alike_of(size_t stride) { return kBandRows * stride; }
 size_t scratch_of(size_t stride) {
   return (kBlock + 1) * alike_of(stride) + kBandRows * (stride + 2 * kPatchRadius);
