@@ -98,6 +98,18 @@ TEST(FitLevels, OfEverySampleAndRange) {
   });
 }
 
+TEST(FitLevels, OfAnyCount) {
+  on_every_target([] {
+    for (size_t count : {1, 2, 15, 16, 17, 31, 33, 63, 64, 65, 127, 200}) {
+      BeforeTheEdge<uint8_t> x(count), out(count);
+      for (size_t p = 0; p < count; ++p) x[p] = static_cast<uint8_t>(7 * p);
+      fit_levels(x.data(), 16, 235, count, out.data());
+      for (size_t p = 0; p < count; ++p)
+        ASSERT_EQ(out[p], 16 + std::lround(219.0 * x[p] / 255)) << p << " of " << count;
+    }
+  });
+}
+
 TEST(ResidualLevels, OfEveryPairOfSamples) {
   on_every_target([] {
     for (const auto& [black, white] : {std::pair{0, 255}, {16, 235}, {128, 128}})

@@ -139,6 +139,20 @@ TEST(Patches, SumsHaveRoomForAnyLevels) {
   });
 }
 
+// Each adds the most that two frames can have in common.
+TEST(Patches, SumsHaveRoomForFramesThatAreTheSame) {
+  Pool pool(2);
+  for (int count : {7, 8, 9, 40}) {
+    const Grid grid = grid_of(30, 41);
+    const GridFrames frames(grid, count);
+    on_every_target([&] {
+      std::vector<float> density(static_cast<size_t>(count) * grid.cells());
+      PatchFrames(grid, frames, count, &pool).density(count, &pool, density.data());
+      for (float d : density) ASSERT_EQ(d, static_cast<float>(count));
+    });
+  }
+}
+
 TEST(Patches, DistanceIsThatOfTheDoubleLoop) {
   std::mt19937 rng(7);
   Pool pool(2);
