@@ -52,6 +52,12 @@ inline void unpack_mask(const uint8_t* bits, size_t count, uint8_t* mask) {
   if (count % 8 > 0) std::memcpy(mask + count / 8 * 8, kSamples[bits[count / 8]].data(), count % 8);
 }
 
+// The first of `count` samples from `from` on that is `colour`, or count.
+inline int next_of(const uint8_t* row, int from, int count, uint8_t colour) {
+  const void* found = std::memchr(row + from, colour, static_cast<size_t>(count - from));
+  return found ? static_cast<int>(static_cast<const uint8_t*>(found) - row) : count;
+}
+
 // Begins to bring samples near.
 template <typename T>
 void fetch(const T* from, int count) {

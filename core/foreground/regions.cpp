@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
-#include <opencv2/imgproc.hpp>
+#include <numeric>
+#include <tuple>
+
+#include "core/foreground/mask_runs.h"
 
 namespace qdmd {
 namespace {
@@ -40,31 +42,79 @@ void merge_overlapping(std::vector<Region>* regions) {
   }
 }
 
-// Gives parts of `white` that are near to each other one label; returns the number of labels.
-// OpenCV's words for memory that runs out become those of the language.
-int label_parts(const cv::Mat& white, cv::Mat* joined, cv::Mat* labels) try {
-  const int gap =
-      std::max(1, static_cast<int>(std::lround(std::min(white.cols, white.rows) / 120.0)));
-  cv::dilate(white, *joined, cv::getStructuringElement(cv::MORPH_RECT, {2 * gap + 1, 2 * gap + 1}));
-  return cv::connectedComponents(*joined, *labels, 8, CV_32S);
-} catch (const cv::Exception& error) {
-  if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
-  throw;
+// The largest first; of equals the one that begins further up, or further to the left.
+bool comes_before(const Region& a, const Region& b) {
+  return std::tuple(-a.area, a.y, a.x) < std::tuple(-b.area, b.y, b.x);
 }
 
-// Of the pixels with one label.
-struct Sum {
-  int left = INT32_MAX, top = INT32_MAX, right = -1, bottom = -1, area = 0;
+// Foreground pixels of a row that are near to each other, or of all rows of a part.
+struct Pixels {
+  int left = INT32_MAX, right = 0, top = INT32_MAX, bottom = 0;  // right and bottom: one beyond
+  int area = 0;
   int64_t residual = 0;
+
+  void add(const Pixels& other) {
+    left = std::min(left, other.left);
+    right = std::max(right, other.right);
+    top = std::min(top, other.top);
+    bottom = std::max(bottom, other.bottom);
+    area += other.area;
+    residual += other.residual;
+  }
 };
 
 }  // namespace
 
 struct RegionFinder::Memory {
-  cv::Mat joined, labels;
-  std::vector<Sum> sums;  // a label's at its number
+  // Of rows, from left to right. Two rows of a part have something nearer than `reach` in them: so
+  // have the pixels from the first to the last one of each, which are `reach` apart at most.
+  std::vector<Pixels> stretches;
+  std::vector<size_t> rows;     // where each row's stretches begin
+  std::vector<size_t> part_of;  // another stretch of the same part, itself for one of them
   std::vector<Region> regions;
+
+  size_t find_part(size_t stretch) {
+    while (part_of[stretch] != stretch) {
+      // Halves the way for the next who asks.
+      part_of[stretch] = part_of[part_of[stretch]];
+      stretch = part_of[stretch];
+    }
+    return stretch;
+  }
+  void find_stretches(const uint8_t* mask, const uint8_t* residual, int width, int y, int reach);
+  void join_rows(int above, int below, int reach);
 };
+
+// Of row y. Pixels that are at most `reach` apart are near.
+void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* residual, int width,
+                                          int y, int reach) {
+  const size_t first = stretches.size();
+  rows.push_back(first);
+  for (int begin = next_of(mask, 0, width, 255), end; begin < width;
+       begin = next_of(mask, end, width, 255)) {
+    end = next_of(mask, begin, width, 0);
+    const int64_t sum = std::accumulate(residual + begin, residual + end, int64_t{0});
+    const Pixels run = {begin, end, y, y + 1, end - begin, sum};
+    if (stretches.size() > first && begin - stretches.back().right < reach) {
+      stretches.back().add(run);
+      continue;
+    }
+    part_of.push_back(stretches.size());
+    stretches.push_back(run);
+  }
+}
+
+void RegionFinder::Memory::join_rows(int above, int below, int reach) {
+  const auto end_of = [&](int y) { return rows[static_cast<size_t>(y) + 1]; };
+  size_t a = rows[static_cast<size_t>(above)], b = rows[static_cast<size_t>(below)];
+  while (a < end_of(above) && b < end_of(below)) {
+    const Pixels &upper = stretches[a], &lower = stretches[b];
+    if (lower.left - upper.right < reach && upper.left - lower.right < reach)
+      part_of[find_part(b)] = find_part(a);
+    // What ends first is near to no other one of the next.
+    ++(upper.right < lower.right ? a : b);
+  }
+}
 
 RegionFinder::RegionFinder() = default;
 RegionFinder::RegionFinder(RegionFinder&&) noexcept = default;
@@ -74,40 +124,33 @@ RegionFinder::~RegionFinder() = default;
 const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t* residual,
                                               int width, int height, int least_area) {
   if (!memory_) memory_ = std::make_unique<Memory>();
-  auto& [joined, labels, sums, regions] = *memory_;
-  // OpenCV has no const pictures.
-  const cv::Mat white(height, width, CV_8UC1, const_cast<uint8_t*>(mask));
-  const int count = label_parts(white, &joined, &labels);
-
-  sums.assign(static_cast<size_t>(count), {});
+  auto& [stretches, rows, part_of, regions] = *memory_;
+  stretches.clear(), rows.clear(), part_of.clear(), regions.clear();
+  const int reach =
+      2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
   for (int y = 0; y < height; ++y) {
-    const int* label = labels.ptr<int>(y);
-    const uint8_t* inside = white.ptr<uint8_t>(y);
-    const uint8_t* levels = residual + static_cast<ptrdiff_t>(y) * width;
-    for (int x = 0; x < width; ++x) {
-      if (!inside[x]) continue;
-      Sum& sum = sums[static_cast<size_t>(label[x])];
-      sum.left = std::min(sum.left, x);
-      sum.right = std::max(sum.right, x);
-      sum.top = std::min(sum.top, y);
-      sum.bottom = y;
-      ++sum.area;
-      sum.residual += levels[x];
-    }
+    const size_t first = static_cast<size_t>(y) * static_cast<size_t>(width);
+    memory_->find_stretches(mask + first, residual + first, width, y, reach);
   }
+  rows.push_back(stretches.size());
+  for (int y = 1; y < height; ++y)
+    for (int above = std::max(0, y - reach); above < y; ++above)
+      memory_->join_rows(above, y, reach);
+  for (size_t k = 0; k < stretches.size(); ++k)
+    if (const size_t part = memory_->find_part(k); part != k) stretches[part].add(stretches[k]);
+
   const double least =
       least_area > 0 ? least_area : std::max(4.0, static_cast<double>(width) * height / 2000);
-  regions.clear();
-  for (const Sum& sum : sums)
-    if (sum.area > 0 && sum.area >= least)
-      regions.push_back({sum.left, sum.top, sum.right - sum.left + 1, sum.bottom - sum.top + 1,
-                         sum.area, static_cast<double>(sum.residual) / sum.area});
-  std::sort(regions.begin(), regions.end(),
-            [](const Region& a, const Region& b) { return a.area > b.area; });
+  for (size_t k = 0; k < stretches.size(); ++k) {
+    const Pixels& part = stretches[k];
+    if (part_of[k] != k || part.area < least) continue;
+    regions.push_back({part.left, part.top, part.right - part.left, part.bottom - part.top,
+                       part.area, static_cast<double>(part.residual) / part.area});
+  }
+  std::sort(regions.begin(), regions.end(), comes_before);
   if (regions.size() > kMostRegions) regions.resize(kMostRegions);
   merge_overlapping(&regions);
-  std::sort(regions.begin(), regions.end(),
-            [](const Region& a, const Region& b) { return a.area > b.area; });
+  std::sort(regions.begin(), regions.end(), comes_before);
   return regions;
 }
 

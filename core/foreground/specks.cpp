@@ -2,17 +2,13 @@
 
 #include <cstring>
 
+#include "core/foreground/mask_runs.h"
+
 namespace qdmd {
 namespace {
 
 size_t most_runs(int width, int height) {
   return static_cast<size_t>(width) * static_cast<size_t>(height) / 16 + 1;
-}
-
-// The first of count samples from `from` on that is `colour`, or count.
-int find(const uint8_t* row, int from, int count, uint8_t colour) {
-  const void* found = std::memchr(row + from, colour, static_cast<size_t>(count - from));
-  return found ? static_cast<int>(static_cast<const uint8_t*>(found) - row) : count;
 }
 
 }  // namespace
@@ -47,8 +43,8 @@ bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal
     rows_[y] = static_cast<uint32_t>(runs_.size());
     const uint8_t* const row = mask + y * width_;
     uint32_t above = y > 0 ? rows_[y - 1] : rows_[y];
-    for (int at = find(row, 0, width, colour); at < width;) {
-      const int end = find(row, at, width, other);
+    for (int at = next_of(row, 0, width, colour); at < width;) {
+      const int end = next_of(row, at, width, other);
       if (runs_.size() == most_runs_) return false;
       const auto run = static_cast<uint32_t>(runs_.size());
       runs_.push_back({at, end, run, static_cast<uint32_t>(end - at)});
@@ -60,7 +56,7 @@ bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal
         runs_[a].area += runs_[b].area;
         runs_[b].part = a;
       }
-      at = end < width ? find(row, end, width, colour) : width;
+      at = end < width ? next_of(row, end, width, colour) : width;
     }
   }
   rows_[height_] = static_cast<uint32_t>(runs_.size());

@@ -1,9 +1,10 @@
 // What each step of a mask costs: the decision with all steps and without each in turn, soft edges,
-// and specks beside OpenCV's connected components. One thread, and the time that it computed,
-// because others may use the machine.
+// and specks and regions beside OpenCV's connected components. One thread, and the time that it
+// computed, because others may use the machine.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "core/foreground/decision.h"
+#include "core/foreground/regions.h"
 #include "core/foreground/soft_mask.h"
 #include "core/passes/planes.h"
 #include "tests/bench/camera.h"
@@ -189,6 +191,38 @@ void add_specks(const std::string& name, const Size& size, bool many,
   });
 }
 
+// What regions() looks at, and what OpenCV takes for the parts alone: foreground that grows by a
+// 1/120 of the short side, and its labels.
+struct GrownLabels {
+  cv::Mat square, joined, labels;
+};
+
+size_t count_regions(RegionFinder* finder, const cv::Mat& mask, const uint8_t* residual) {
+  return finder->find(mask.data, residual, mask.cols, mask.rows, 0).size();
+}
+
+size_t count_regions(GrownLabels* all, const cv::Mat& mask, const uint8_t*) {
+  if (all->square.empty()) {
+    const int side = 2 * std::max(1, int(std::lround(std::min(mask.cols, mask.rows) / 120.0))) + 1;
+    all->square = cv::getStructuringElement(cv::MORPH_RECT, {side, side});
+  }
+  cv::dilate(mask, all->joined, all->square);
+  return size_t(cv::connectedComponents(all->joined, all->labels, 8, CV_32S));
+}
+
+template <typename Finder>
+void add_regions(const std::string& name, const Size& size) {
+  add("regions/" + name, size, [=](Street& made) -> Turn {
+    return [=, decision = decision_of(made), finder = std::make_shared<Finder>(),
+            residual = std::vector<uint8_t>(size.pixels(), 40)](Street& street) {
+      decision->decide(street.frame(false), nullptr);
+      const cv::Mat mask(size.height, size.width, CV_8UC1, const_cast<uint8_t*>(decision->mask()));
+      return computed(
+          [&] { benchmark::DoNotOptimize(count_regions(finder.get(), mask, residual.data())); });
+    };
+  });
+}
+
 void add_all(const Size& size) {
   add_decision("all", size, {});
   const std::pair<const char*, bool DecisionSteps::*> steps[] = {
@@ -216,6 +250,8 @@ void add_all(const Size& size) {
                        [=] { return std::make_shared<Specks>(size.width, size.height); });
     add_specks<Labels>("opencv/" + masks, size, many, [] { return std::make_shared<Labels>(); });
   }
+  add_regions<RegionFinder>("ours", size);
+  add_regions<GrownLabels>("opencv", size);
 }
 
 }  // namespace

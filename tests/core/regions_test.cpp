@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <tuple>
+
 namespace qdmd::test {
 namespace {
 
@@ -111,6 +116,87 @@ TEST(Regions, AreNotCountless) {
   for (int y = 4; y < 940; y += 40)
     for (int x = 4; x < 1240; x += 40) mask.box(x, y, 3, 3, 50);
   EXPECT_EQ(mask.regions(1).size(), RegionFinder::kMostRegions);
+}
+
+// Parts by flooding, pixel after pixel, before boxes that overlap are merged.
+std::vector<Region> flooded(const Mask& mask) {
+  const int reach =
+      2 * std::max(1, int(std::lround(std::min(mask.width, mask.height) / 120.0))) + 1;
+  std::vector<Region> found;
+  std::vector<uint8_t> seen(mask.white.size());
+  for (int start = 0; start < mask.width * mask.height; ++start) {
+    if (seen[size_t(start)] || !mask.white[size_t(start)]) continue;
+    std::vector<int> part = {start};
+    seen[size_t(start)] = 1;
+    int left = INT32_MAX, right = 0, top = INT32_MAX, bottom = 0, sum = 0;
+    for (size_t i = 0; i < part.size(); ++i) {
+      const int x = part[i] % mask.width, y = part[i] / mask.width;
+      left = std::min(left, x), right = std::max(right, x);
+      top = std::min(top, y), bottom = std::max(bottom, y);
+      sum += mask.residual[size_t(part[i])];
+      for (int yy = std::max(0, y - reach); yy <= std::min(mask.height - 1, y + reach); ++yy)
+        for (int xx = std::max(0, x - reach); xx <= std::min(mask.width - 1, x + reach); ++xx) {
+          const auto at = size_t(yy * mask.width + xx);
+          if (seen[at] || !mask.white[at]) continue;
+          seen[at] = 1;
+          part.push_back(int(at));
+        }
+    }
+    const int area = int(part.size());
+    found.push_back({left, top, right - left + 1, bottom - top + 1, area, double(sum) / area});
+  }
+  return found;
+}
+
+// The same where no boxes overlap any more: the order does not matter.
+std::vector<Region> merged(std::vector<Region> regions) {
+  for (size_t i = 0; i < regions.size(); ++i)
+    for (size_t k = 0; k < i; ++k) {
+      Region &a = regions[k], &b = regions[i];
+      const int left = std::min(a.x, b.x), right = std::max(a.x + a.width, b.x + b.width);
+      const int top = std::min(a.y, b.y), bottom = std::max(a.y + a.height, b.y + b.height);
+      if (right - left >= a.width + b.width || bottom - top >= a.height + b.height) continue;
+      const double sum = a.area * a.mean_residual + b.area * b.mean_residual;
+      a = {left, top, right - left, bottom - top, a.area + b.area, sum / (a.area + b.area)};
+      regions.erase(regions.begin() + ptrdiff_t(i));
+      return merged(std::move(regions));
+    }
+  std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) {
+    return std::tuple(-a.area, a.y, a.x) < std::tuple(-b.area, b.y, b.x);
+  });
+  return regions;
+}
+
+TEST(Regions, AreFoundByFlooding) {
+  std::mt19937 rng(77);
+  size_t alone = 0, joined = 0;
+  for (auto [width, height] : {std::pair{1, 1}, {40, 1}, {1, 40}, {97, 64}, {320, 240}, {300, 700}})
+    for (int turn = 0; turn < 30; ++turn) {
+      // Boxes of a few pixels, and long ones, in whose corners others lie.
+      Mask mask(width, height);
+      const int boxes = 1 + width * height / 4000 * (turn % 10);
+      for (int k = 0; k < boxes; ++k) {
+        const bool tall = k % 4 == 0, wide = k % 4 == 1;
+        const int w = 1 + int(rng() % (wide ? 90 : 9)), h = 1 + int(rng() % (tall ? 90 : 9));
+        const int x = int(rng() % unsigned(width)), y = int(rng() % unsigned(height));
+        mask.box(x, y, std::min(w, width - x), std::min(h, height - y), uint8_t(rng() % 256));
+      }
+      const auto parts = flooded(mask);
+      if (parts.size() > RegionFinder::kMostRegions) continue;
+      const auto expected = merged(parts), found = mask.regions(1);
+      ASSERT_EQ(found.size(), expected.size()) << width << "x" << height;
+      for (size_t k = 0; k < found.size(); ++k) {
+        const Region& region = expected[k];
+        expect_box(found[k], region.x, region.y, region.width, region.height);
+        ASSERT_EQ(found[k].area, region.area);
+        // Means of means are rounded in another order.
+        ASSERT_NEAR(found[k].mean_residual, region.mean_residual, 1e-9);
+      }
+      alone += found.size();
+      joined += parts.size() - found.size();
+    }
+  EXPECT_GT(alone, 500u);
+  EXPECT_GT(joined, 50u);
 }
 
 // Nothing of one picture is left in the next, whatever its size.
