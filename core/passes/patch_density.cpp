@@ -122,8 +122,9 @@ HWY_EXPORT(add_patch);
 
 // Whole vectors of every instruction set, and their bytes.
 constexpr size_t kVector = 16, kAligned = kVector * sizeof(uint16_t);
-// Rows of a band at most. What it has in common with its neighbours costs little.
-constexpr int kBandRows = 12;
+// Rows of a band at most: a quarter of a grid's. What it has in common with its neighbours costs
+// little.
+constexpr int kBandRows = 15;
 // Frames that are compared with all before while they are in the first caches, and as many of
 // those before: what so many have in common has room in 16 bits.
 constexpr int kBlock = 8;
@@ -131,6 +132,12 @@ constexpr int kPatchCells = (2 * kPatchRadius + 1) * (2 * kPatchRadius + 1);
 static_assert(kBlock * kChannels * kSimilar * kStepsPerLevel * kPatchCells < 65536);
 
 size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector; }
+
+// As many for each thread, if there are enough rows.
+int bands_of(int rows, int threads) {
+  const int fewest = (rows + kBandRows - 1) / kBandRows;
+  return std::min(rows, (fewest + threads - 1) / threads * threads);
+}
 
 // Samples for a band whose rows are `stride` apart: what two frames have in common; and all that a
 // thread needs, which is that of each frame of a block, and of another one, and sums.
@@ -143,8 +150,7 @@ size_t scratch_of(size_t stride) {
 
 PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool)
     : grid_(grid),
-      bands_(std::min(grid.rows, std::max((grid.rows + kBandRows - 1) / kBandRows,
-                                          static_cast<int>(pool->threads())))),
+      bands_(bands_of(grid.rows, static_cast<int>(pool->threads()))),
       // Threads touch what is theirs.
       steps_(std::make_unique_for_overwrite<uint16_t[]>(
           static_cast<size_t>(count) * kChannels * plane() + kVector)),
