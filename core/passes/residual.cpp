@@ -115,16 +115,15 @@ HWY_INLINE size_t few_norms(const uint8_t* const* x, const uint8_t* const* l, si
 template <int kBits>
 HWY_INLINE size_t norms(const uint8_t* const* x, const uint8_t* const* l, size_t count,
                         uint8_t* out) {
-  using All = EvenOdd;
-  const All::Bytes d;
-  const All::Words d16;
+  const EvenOdd::Bytes d;
+  const EvenOdd::Words d16;
   // Known not to change with what is written.
   const uint8_t *xr = x[0], *xg = x[1], *xb = x[2], *lr = l[0], *lg = l[1], *lb = l[2];
   const auto distance = [&](const uint8_t* of_x, const uint8_t* of_l) HWY_ATTR {
     const auto a = hn::LoadU(d, of_x), b = hn::LoadU(d, of_l);
     return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
   };
-  const auto norm = [&](All::V16 r, All::V16 g, All::V16 b) HWY_ATTR {
+  const auto norm = [&](EvenOdd::V16 r, EvenOdd::V16 g, EvenOdd::V16 b) HWY_ATTR {
     // Saturated sums have a norm of 255 like all above.
     auto sum = hn::SaturatedAdd(hn::SaturatedAdd(hn::Mul(r, r), hn::Mul(g, g)), hn::Mul(b, b));
     if constexpr (kBits > 0)
@@ -139,8 +138,8 @@ HWY_INLINE size_t norms(const uint8_t* const* x, const uint8_t* const* l, size_t
     p = std::min(p, count - lanes);
     const auto r = distance(xr + p, lr + p), g = distance(xg + p, lg + p),
                b = distance(xb + p, lb + p);
-    hn::StoreU(All::joined(norm(All::even(r), All::even(g), All::even(b)),
-                           norm(All::odd(r), All::odd(g), All::odd(b))),
+    hn::StoreU(EvenOdd::joined(norm(EvenOdd::even(r), EvenOdd::even(g), EvenOdd::even(b)),
+                               norm(EvenOdd::odd(r), EvenOdd::odd(g), EvenOdd::odd(b))),
                d, out + p);
   }
   return count;

@@ -130,11 +130,9 @@ void StandingLooks::take_next(size_t at) {
   for (int c = 0; c < kChannels; ++c)
     from_before += std::abs(looks_.plane(kNext, c)[at] - looks_.plane(kBefore, c)[at]);
   const Look before = std::exchange(cell.before, cell.look);
-  const bool had_before = std::exchange(cell.had_before, frames_[at] > 0);
   cell.look = {cell.next_since, number_};
   frames_[at] = std::exchange(next_frames_[at], 0);
-  if (had_before && from_before < kSame &&
-      cell.look.since - before.last <= before.last - before.since)
+  if (from_before < kSame && cell.look.since - before.last <= before.last - before.since)
     cell.look.since = before.since;
   for (int c = 0; c < kChannels; ++c) {
     looks_.plane(kBefore, c)[at] = looks_.plane(kLook, c)[at];

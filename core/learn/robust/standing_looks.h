@@ -49,11 +49,10 @@ class StandingLooks {
     int64_t since = 0, last = 0;
   };
   // What it shows (the last frame is known once another one shows something else), the one before,
-  // if there was one, and when that came which may become the next.
+  // which lasted for nothing if there was none, and when that came which may become the next.
   struct Cell {
     Look look, before;
     int64_t next_since = 0;
-    bool had_before = false;
   };
   bool shows(size_t cell) const { return frames_[cell] >= kSteady && next_frames_[cell] == 0; }
   void see_other(size_t cell, const std::array<float, kChannels>& level);
