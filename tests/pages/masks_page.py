@@ -49,11 +49,13 @@ def cost(path):
               'soft/4': 'mask-softness=4 adds', 'soft/8': 'mask-softness=8 adds',
               'soft/15': 'mask-softness=15 adds',
               'specks/ours/few': 'specks and holes alone',
-              'specks/opencv/few': "the same with OpenCV's connectedComponentsWithStats"}
+              'specks/opencv/few': "the same with OpenCV's connectedComponentsWithStats",
+              'regions/ours': 'boxes of regions alone',
+              'regions/opencv': "their parts with OpenCV's dilate and connectedComponents"}
     sizes = list(dict.fromkeys(name.split('/')[-1] for name in medians))
     rows = []
     for name, title in titles.items():
-        digits = 2 if name.startswith('specks/ours') else 1
+        digits = 2 if '/ours' in name else 1
         rows.append([title] + [f'{medians[f"{name}/{size}"]:.{digits}f}' for size in sizes])
     return table(['ns a pixel'] + sizes, rows)
 
