@@ -49,7 +49,8 @@ bool comes_before(const Region& a, const Region& b) {
 
 // Foreground pixels of a row that are near to each other, or of all rows of a part.
 struct Pixels {
-  int left = INT32_MAX, right = 0, top = INT32_MAX, bottom = 0;  // right and bottom: one beyond
+  // right and bottom are one beyond: so what is at most `reach` apart has less than `reach` between.
+  int left = INT32_MAX, right = 0, top = INT32_MAX, bottom = 0;
   int area = 0;
   int64_t residual = 0;
 
@@ -66,8 +67,9 @@ struct Pixels {
 }  // namespace
 
 struct RegionFinder::Memory {
-  // Of rows, from left to right. Two rows of a part have something nearer than `reach` in them: so
-  // have the pixels from the first to the last one of each, which are `reach` apart at most.
+  // Of rows, from left to right: pixels of which each is at most `reach` right of the one before.
+  // If the spans of two are at most `reach` apart, so are two of their pixels: the end of one lies
+  // beside the other, or in one of its gaps.
   std::vector<Pixels> stretches;
   std::vector<size_t> rows;     // where each row's stretches begin
   std::vector<size_t> part_of;  // another stretch of the same part, itself for one of them
@@ -85,7 +87,7 @@ struct RegionFinder::Memory {
   void join_rows(int above, int below, int reach);
 };
 
-// Of row y. Pixels that are at most `reach` apart are near.
+// Of row y.
 void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* residual, int width,
                                           int y, int reach) {
   const size_t first = stretches.size();

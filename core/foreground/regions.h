@@ -14,12 +14,11 @@ struct Region {
   double mean_residual = 0;                 // of these, levels
 };
 
-// Looks at one picture after another, with the same memory.
+// Looks at one picture after another, with the same memory, which grows with what it finds.
 class RegionFinder {
  public:
   static constexpr size_t kMostRegions = 64;
 
-  // Takes memory with the first picture.
   RegionFinder();
   RegionFinder(RegionFinder&&) noexcept;
   RegionFinder& operator=(RegionFinder&&) noexcept;

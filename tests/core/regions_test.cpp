@@ -70,6 +70,17 @@ TEST(Regions, PartsThatAreNearAreOne) {
   EXPECT_EQ(mask.regions().size(), 2u);
 }
 
+// 5 pixels are as far as parts reach here, along a row, along a column and in both.
+TEST(Regions, PartsReachAsFarAsTheySay) {
+  for (const int gap : {5, 6})
+    for (const auto& [x, y] : {std::pair{gap, 0}, {-gap, 0}, {0, gap}, {gap, gap}, {-gap, gap}}) {
+      Mask mask(320, 240);
+      mask.box(100, 100, 1, 1, 60);
+      mask.box(100 + x, 100 + y, 1, 1, 60);
+      EXPECT_EQ(mask.regions(1).size(), gap == 5 ? 1u : 2u) << x << ", " << y;
+    }
+}
+
 // A frame around something else: boxes overlap though nothing touches. What has grown by it
 // overlaps a third.
 TEST(Regions, OverlappingBoxesAreMerged) {
