@@ -140,11 +140,11 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
       noise_(width, band.rows(), steps.constants, band.first()),
       specks_(width, band.height()),
       unknown_(static_cast<size_t>(shape_.strips)) {
-  for (auto& level : of_.level) level.resize(shape_.padded());
-  of_.differing.resize(shape_.padded());
-  of_.foreground.resize(shape_.padded());
-  of_.mask.resize(shape_.pixels());
-  of_.shaded.resize(shape_.pixels());
+  for (auto& level : of_.level) level.resize(shape_.padded(), 0);
+  of_.differing.resize(shape_.padded(), 0);
+  of_.foreground.resize(shape_.padded(), 0);
+  of_.mask.resize(shape_.pixels(), 0);
+  of_.shaded.resize(shape_.pixels(), 0);
   if (!band.is_whole()) {
     whole_.resize(static_cast<size_t>(width) * static_cast<size_t>(band.height()));
     size_t bytes = 0;

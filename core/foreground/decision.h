@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/large_vector.h"
 #include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
 #include "core/foreground/ignored.h"
@@ -109,7 +110,7 @@ class Decision {
   // Of the frame: L, what differs from it, and what is foreground before and after the vote; and
   // where light alone differs.
   struct Pictures {
-    std::vector<uint8_t> level[3], differing, foreground, mask, shaded;
+    LargeVector<uint8_t> level[3], differing, foreground, mask, shaded;
   };
   // What is compared, and how: means or pixels, above how many levels; textures that move are
   // looked for.

@@ -12,7 +12,7 @@ PixelNoise::PixelNoise(int width, int height, const DecisionConstants& constants
       first_row_(first_row),
       most_samples_(constants.noise_samples),
       weight_of_moments_(constants.weight_of_moments),
-      mean_(width_ * static_cast<size_t>(height)),
+      mean_(width_ * static_cast<size_t>(height), 0),
       before_((static_cast<size_t>(height) / kRows + 1) * width_) {
   rates_.factor = static_cast<int>(std::lround(256 * constants.mean_distances));
   rates_.most_of_moments = static_cast<int>(std::lround(256 * constants.most_of_moments));

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/large_vector.h"
 #include "core/foreground/decision_steps.h"
 #include "core/passes/mean_distance.h"
 
@@ -44,7 +45,7 @@ class PixelNoise {
   double most_samples_, weight_of_moments_;
   NoiseRates rates_;
   int64_t frames_ = 0;
-  std::vector<uint16_t> mean_;
+  LargeVector<uint16_t> mean_;
   std::vector<uint8_t> before_;  // the rows that are learnt from, of the frame before
 };
 

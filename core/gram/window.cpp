@@ -11,11 +11,15 @@ constexpr size_t kAlignment = 64;
 
 size_t padded(size_t pixels) { return (pixels + kAlignment - 1) / kAlignment * kAlignment; }
 
-}  // namespace
-
-void PlaneSlots::Free::operator()(uint8_t* data) const {
-  ::operator delete[](data, std::align_val_t(kAlignment));
+LargeVector<uint8_t> memory_for(uint64_t bytes) {
+  LargeVector<uint8_t> memory;
+  // A vector calls what no machine has a length that is wrong.
+  if (bytes > memory.max_size()) throw std::bad_alloc();
+  memory.resize(bytes);
+  return memory;
 }
+
+}  // namespace
 
 uint64_t PlaneSlots::bytes(int capacity, size_t pixels, size_t chroma_samples) {
   uint64_t slot = 0, bytes = 0;
@@ -33,7 +37,7 @@ PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples)
       chroma_samples_(chroma_samples),
       chroma_size_(padded(chroma_samples)),
       reserved_(bytes(capacity, pixels, chroma_samples)),
-      data_(static_cast<uint8_t*>(::operator new[](reserved_, std::align_val_t(kAlignment)))) {}
+      data_(memory_for(reserved_)) {}
 
 void PlaneSlots::pad(int slot) {
   std::memset(plane(slot, 0) + pixels_, 0, plane_size_ - pixels_);

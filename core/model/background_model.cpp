@@ -75,7 +75,7 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
   // Of what freeze_at() makes of them, too. Room for more is made without the old ones beside it.
   const size_t room = direct_ ? 0 : std::max<size_t>(pictures, kChannels) * pixels_;
   if (samples_.capacity() < room) {
-    std::vector<float>().swap(samples_);
+    LargeVector<float>().swap(samples_);
     samples_.reserve(room);
   }
   make_pictures(direct_ ? 0 : pictures);
@@ -268,7 +268,7 @@ void BackgroundModel::make_room(size_t pixels, bool limits) {
   if (limits) limits_.reserve(pixels);
   if (samples_.capacity() >= kChannels * pixels) return;
   // Without the old ones beside it, unless they are in use.
-  if (picture_count() == 0) std::vector<float>().swap(samples_);
+  if (picture_count() == 0) LargeVector<float>().swap(samples_);
   samples_.reserve(kChannels * pixels);
   make_pictures(picture_count());
 }

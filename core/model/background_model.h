@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/base/large_vector.h"
 #include "core/dmd/temporal_model.h"
 #include "core/gram/window.h"
 #include "core/passes/combine.h"
@@ -151,7 +152,7 @@ class BackgroundModel {
   std::vector<const uint8_t*> planes_;
   std::vector<double>
       coefficients_;            // of the pictures, or of L(t) where direct_, for combine_planes
-  std::vector<float> samples_;  // of the pictures, one after another
+  LargeVector<float> samples_;  // of the pictures, one after another
   std::vector<float*> pictures_;
   std::vector<float> weights_;  // 3 x K over pictures
   std::vector<Gain> gains_;     // of the snapshots; none: the same light

@@ -253,7 +253,7 @@ size_t run_of(int snapshots, bool deep) {
 
 WindowMask::WindowMask(int capacity, size_t pixels)
     // Vectors of bits are read whole, also at the end.
-    : stride_(mask_bytes(pixels)), bits_(stride_ * static_cast<size_t>(capacity) + kUnit) {}
+    : stride_(mask_bytes(pixels)), bits_(stride_ * static_cast<size_t>(capacity) + kUnit, 0) {}
 
 uint64_t WindowMask::bytes(int capacity, size_t pixels) {
   return uint64_t{mask_bytes(pixels)} * static_cast<uint64_t>(capacity) + kUnit;

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/base/large_vector.h"
 #include "core/gram/window.h"
 #include "core/passes/mask.h"
 #include "core/passes/sampling.h"
@@ -24,7 +25,7 @@ class WindowMask {
 
  private:
   size_t stride_ = 0;
-  std::vector<uint8_t> bits_;
+  LargeVector<uint8_t> bits_;
 };
 
 // Fills runs of pixels of all snapshots. One for each thread.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/base/large_vector.h"
 #include "core/gram/window.h"
 #include "core/parallel/band.h"
 #include "core/parallel/pool.h"
@@ -33,7 +34,7 @@ class GridFrames {
  public:
   GridFrames() = default;
   GridFrames(size_t cells, int count)
-      : cells_(cells), levels_(cells * kChannels * static_cast<size_t>(count)) {}
+      : cells_(cells), levels_(cells * kChannels * static_cast<size_t>(count), 0.0f) {}
   GridFrames(const Grid& grid, int count) : GridFrames(grid.cells(), count) {}
 
   static uint64_t bytes(const Grid& grid, int count) {
@@ -55,7 +56,7 @@ class GridFrames {
     return (static_cast<size_t>(frame) * kChannels + static_cast<size_t>(channel)) * cells_;
   }
   size_t cells_ = 0;
-  std::vector<float> levels_;
+  LargeVector<float> levels_;
 };
 
 // Such pictures, wherever they lie: names their places.

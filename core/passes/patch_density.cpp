@@ -122,8 +122,8 @@ HWY_EXPORT(add_patch);
 
 // Whole vectors of every instruction set, and their bytes.
 constexpr size_t kVector = 16, kAligned = kVector * sizeof(uint16_t);
-// Rows of a band at most: a quarter of a grid's. What it has in common with its neighbours costs
-// little.
+// Rows of a band at most: so that the usual grid, of 46 to 48 rows, makes four. What a band has in
+// common with its neighbours costs little.
 constexpr int kBandRows = 15;
 // Frames that are compared with all before while they are in the first caches, and as many of
 // those before: what so many have in common has room in 16 bits.
@@ -148,17 +148,18 @@ size_t scratch_of(size_t stride) {
 
 }  // namespace
 
-PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool)
+PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool,
+                         LargeVector<uint16_t>* room)
     : grid_(grid),
       bands_(bands_of(grid.rows, static_cast<int>(pool->threads()))),
-      // Threads touch what is theirs.
-      steps_(std::make_unique_for_overwrite<uint16_t[]>(
-          static_cast<size_t>(count) * kChannels * plane() + kVector)),
       limit_(plane()),
       scratch_(scratch_size() * pool->threads()) {
   const auto cols = static_cast<size_t>(grid_.cols), stride = round_up(cols);
-  first_ = steps_.get();
-  while (reinterpret_cast<uintptr_t>(first_) % kAligned != 0) ++first_;
+  if (!room) room = &own_room_;
+  // Threads touch what is theirs.
+  make_room(room, steps_of(grid, static_cast<uint64_t>(count)));
+  first_ = room->data();
+  static_assert(kAligned <= kLargeAlignment);
   pool->run(static_cast<size_t>(count), [&](size_t t) {
     // The channels lie one after another in both.
     const float* from = frames.plane(static_cast<int>(t), 0);
@@ -178,8 +179,13 @@ PatchFrames::PatchFrames(const Grid& grid, const GridPictures& frames, int count
 uint64_t PatchFrames::bytes(const Grid& grid, uint64_t count, int threads) {
   const uint64_t stride = round_up(static_cast<size_t>(grid.cols)),
                  plane = static_cast<uint64_t>(grid.rows) * stride;
-  return sizeof(uint16_t) * (plane * (count * kChannels + 1) + kVector +
-                             static_cast<uint64_t>(threads) * scratch_of(stride));
+  return sizeof(uint16_t) *
+         (steps_of(grid, count) + plane + static_cast<uint64_t>(threads) * scratch_of(stride));
+}
+
+uint64_t PatchFrames::steps_of(const Grid& grid, uint64_t count) {
+  return count * kChannels * static_cast<uint64_t>(grid.rows) *
+         round_up(static_cast<size_t>(grid.cols));
 }
 
 size_t PatchFrames::plane() const {
@@ -243,17 +249,24 @@ void PatchFrames::add_common(int s, int t, size_t first, size_t end, uint16_t* s
    end, sums, alike, another);
 }
 
+uint64_t patch_distance_steps(const Grid& grid, uint64_t count) {
+  return grid.cells() * kChannels * round_up(count);
+}
+
 uint64_t patch_distance_bytes(const Grid& grid, uint64_t count) {
-  return sizeof(uint16_t) * grid.cells() * (kChannels * round_up(count) + count);
+  return sizeof(uint16_t) * (patch_distance_steps(grid, count) + grid.cells() * count);
 }
 
 void patch_distance(const Grid& grid, const GridPictures& frames, int count, const int* reference,
-                    Pool* pool, uint16_t* distance) {
+                    Pool* pool, uint16_t* distance, LargeVector<uint16_t>* room) {
   const auto rows = static_cast<size_t>(grid.rows), cols = static_cast<size_t>(grid.cols);
   const int known = std::max(count, *std::max_element(reference, reference + grid.cells()) + 1);
   const auto all = static_cast<size_t>(count), stride = round_up(static_cast<size_t>(known));
   // Of each cell and channel all frames side by side.
-  const auto steps = std::make_unique_for_overwrite<uint16_t[]>(grid.cells() * kChannels * stride);
+  LargeVector<uint16_t> own_room;
+  if (!room) room = &own_room;
+  make_room(room, patch_distance_steps(grid, static_cast<uint64_t>(known)));
+  uint16_t* const steps = room->data();
   std::vector<uint16_t> sums(stride * pool->threads());
   // Some cells of all frames at a time: their frames are too far apart for the caches to keep the
   // others.
@@ -266,7 +279,7 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
         uint16_t of_frame[kTogether] = {};
         if (t < known) HWY_DYNAMIC_DISPATCH(to_steps)
         (frames.plane(t, static_cast<int>(c)) + first, size, of_frame);
-        uint16_t* to = steps.get() + (first * kChannels + c) * stride + static_cast<size_t>(t);
+        uint16_t* to = steps + (first * kChannels + c) * stride + static_cast<size_t>(t);
         for (size_t i = 0; i < size; ++i) to[i * kChannels * stride] = of_frame[i];
       }
   });
@@ -276,7 +289,7 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
     for (size_t col = 0; col < cols; ++col) {
       const size_t cell = row * cols + col;
       HWY_DYNAMIC_DISPATCH(add_patch)
-      (steps.get(), cols, stride, row - std::min(row, kReach), std::min(rows - 1, row + kReach),
+      (steps, cols, stride, row - std::min(row, kReach), std::min(rows - 1, row + kReach),
        col - std::min(col, kReach), std::min(cols - 1, col + kReach),
        static_cast<size_t>(reference[cell]), sum);
       std::copy_n(sum, all, distance + cell * all);

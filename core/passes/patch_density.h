@@ -1,9 +1,9 @@
 // How alike the patches around a cell are in different frames.
 #pragma once
 
-#include <memory>
 #include <vector>
 
+#include "core/base/large_vector.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
@@ -37,8 +37,13 @@ inline int patch_cells(const Grid& grid, int row, int col, int radius = kNearRad
 // max(0, 1 - d(s, t) / kSimilar).
 class PatchFrames {
  public:
-  PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool);
+  // room: where their steps are kept, as many as steps_of() says, until the next ones; null: in
+  // memory of its own.
+  PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool,
+              LargeVector<uint16_t>* room = nullptr);
+  // Without a room.
   static uint64_t bytes(const Grid& grid, uint64_t count, int threads);
+  static uint64_t steps_of(const Grid& grid, uint64_t count);
 
   // density[t * cells + cell] = the sum over frames s < count of how alike s and t are.
   void density(int count, Pool* pool, float* density);
@@ -65,7 +70,7 @@ class PatchFrames {
   int bands_;
   // Rows are whole vectors, and begin at one. limit_: of each cell, the patch's steps at which
   // nothing is alike.
-  std::unique_ptr<uint16_t[]> steps_;
+  LargeVector<uint16_t> own_room_;
   uint16_t* first_ = nullptr;
   std::vector<uint16_t> limit_;
   std::vector<uint16_t> scratch_;  // for each thread
@@ -73,10 +78,12 @@ class PatchFrames {
 
 // distance[cell * count + t]: the steps that the patches around the cell in frame t and in frame
 // reference[cell] differ by, all channels together: d times kChannels * kStepsPerLevel *
-// patch_cells(), of patches of 3 x 3.
+// patch_cells(), of patches of 3 x 3. room: as that of PatchFrames, where patch_distance_steps()
+// are kept meanwhile.
 void patch_distance(const Grid& grid, const GridPictures& frames, int count, const int* reference,
-                    Pool* pool, uint16_t* distance);
-// The memory that it takes, with the result.
+                    Pool* pool, uint16_t* distance, LargeVector<uint16_t>* room = nullptr);
+uint64_t patch_distance_steps(const Grid& grid, uint64_t count);
+// The memory that it takes, with the result, without a room.
 uint64_t patch_distance_bytes(const Grid& grid, uint64_t count);
 
 }  // namespace qdmd

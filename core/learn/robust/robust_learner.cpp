@@ -105,20 +105,27 @@ SampledRows RobustLearner::sampled_rows() const {
   return {band_.first_sample(step_) - band_.first(), band_.own_end() - band_.first(), step_};
 }
 
+// Frames that a start compares, and a picture of earlier windows.
+uint64_t RobustLearner::most_looks(int window_size, Models models) const {
+  const int snapshots = thinning_of(models).most_snapshots(window_size);
+  return static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) +
+                               remembered_frames(window_size) + 1);
+}
+
 uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) const {
   const auto workers = static_cast<uint64_t>(threads);
   DmdOptions dmd = options_.dmd;
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int snapshots = thinning_of(models).most_snapshots(window_size),
             remembered = remembered_frames(window_size);
-  const auto looks =
-      static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) + remembered + 1);
+  const uint64_t looks = most_looks(window_size, models);
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
   const uint64_t pictures = pixels() * (2 * kChannels + 4);
   const uint64_t kept =
       pictures + LightScratch::bytes(grid_.cells()) + 3 * GridFrames::bytes(grid_, 1) + levels(3) +
-      StableFrames::bytes(grid_, looks) + WindowMask::bytes(snapshots, pixels()) +
+      StableFrames::bytes(grid_, looks) + StableFramesRoom::bytes(grid_, looks) +
+      WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, shape(), grid_) +
       StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
@@ -172,6 +179,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   looks_ = StandingLooks(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
+  stable_room_ = StableFramesRoom(grid_, most_looks(room.window_size, room.models));
   memory_ = FrameMemory(remembered_frames(room.window_size), shape(), grid_);
   mask_ = WindowMask(snapshots, pixels());
   samples_ = Window(snapshots, samples_at(finest_step_));
@@ -322,7 +330,7 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
     first_looks = absorbed_now_.first_looks(numbers);
   }
   stable_ = find_stable_frames(grid_, chosen, count, earlier_.known() ? &recollection : nullptr,
-                               room_.pool, first_looks);
+                               room_.pool, first_looks, &stable_room_);
   if (stable_.another_scene && old > 0) {
     memory_.forget();
     earlier_.forget();

@@ -109,6 +109,7 @@ class RobustLearner : public Learner {
   size_t samples_at(int step) const;
   SampledRows sampled_rows() const;
   int remembered_frames(int window_size) const;
+  uint64_t most_looks(int window_size, Models models) const;
   // Of the first snapshot, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }
   void start(const SnapshotRange& snapshots);
@@ -165,6 +166,7 @@ class RobustLearner : public Learner {
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
   StableFrames stable_;
+  StableFramesRoom stable_room_;
   ReferencePicture reference_;
   std::vector<uint8_t> spread_;  // quarters of a level, mean of 5 x 5
   std::vector<uint8_t> reach_;

@@ -128,14 +128,23 @@ std::vector<int> densest(std::span<const float> density, size_t cells, Pool* poo
 // What hides most of the picture is recognized by its colours; with a better background these are
 // known better.
 void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
-                       std::span<const float> density, std::vector<int>* from, Pool* pool) {
+                       std::span<const float> density, std::vector<int>* from, Pool* pool,
+                       StableFramesRoom* room) {
   constexpr int kRounds = 3;
   ClutterColours colours(grid, frames, count, pool);
   if (!colours.hides_much(density, *from)) return;
+  // Steps are not needed meanwhile, and this takes as much.
+  LargeVector<uint16_t>().swap(room->steps);
   for (int round = 0; round < kRounds; ++round) {
     colours.learn(*from);
     *from = densest(colours.weigh(density), grid.cells(), pool);
   }
+}
+
+// Of the room's steps.
+uint64_t steps_bytes(const Grid& grid, uint64_t looks) {
+  return sizeof(uint16_t) *
+         std::max(PatchFrames::steps_of(grid, looks), patch_distance_steps(grid, looks));
 }
 
 // How far a frame that shows the background may be: distance, of all frames less one. scratch: as
@@ -160,15 +169,17 @@ float limit_of(std::span<const float> distance, size_t left_out, std::span<float
 
 StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
-                                const FirstLooks& first_looks) {
+                                const FirstLooks& first_looks, StableFramesRoom* room) {
+  StableFramesRoom own_room;
+  if (!room) room = &own_room;
   const size_t cells = grid.cells();
   const size_t most = cells * static_cast<size_t>(count + (earlier ? 1 : 0));
   // Threads touch what is theirs.
-  auto densities = std::make_unique_for_overwrite<float[]>(most);
-  std::span<float> density(densities.get(), most);
+  make_room(&room->density, most);
+  std::span<float> density(room->density);
   StableFrames result;
   {
-    PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool);
+    PatchFrames patches(grid, frames, count + (earlier ? 1 : 0), pool, &room->steps);
     patches.density(count, pool, density.data());
     if (earlier && !add_recollection(cells, &patches, count, *earlier, pool, density)) {
       result.another_scene = true;
@@ -187,20 +198,19 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
   std::vector<int> from = densest(density, cells, pool);
   // What was absorbed is the background of a part of the frames only.
-  if (first_looks.from.empty()) leave_clutter_out(grid, frames, count, density, &from, pool);
+  if (first_looks.from.empty()) leave_clutter_out(grid, frames, count, density, &from, pool, room);
   compare_contours(grid, frames, count, density, &from);
 
-  densities.reset();
-  const auto distance =
-      std::make_unique_for_overwrite<uint16_t[]>(cells * static_cast<size_t>(looks));
-  patch_distance(grid, frames, looks, from.data(), pool, distance.get());
+  make_room(&room->distance, cells * static_cast<size_t>(looks));
+  const uint16_t* const distance = room->distance.data();
+  patch_distance(grid, frames, looks, from.data(), pool, room->distance.data(), &room->steps);
   result.of_cell = FrameLists(cells, looks);
   result.limit.resize(cells);
   const auto all = static_cast<size_t>(count), cols = static_cast<size_t>(grid.cols);
-  const size_t room = static_cast<size_t>(looks) + all;
-  std::vector<float> rooms(room * pool->threads());
+  const size_t each = static_cast<size_t>(looks) + all;
+  std::vector<float> rooms(each * pool->threads());
   pool->run(static_cast<size_t>(grid.rows), [&](size_t row, size_t worker) {
-    float *of_cell = rooms.data() + worker * room, *scratch = of_cell + looks;
+    float *of_cell = rooms.data() + worker * each, *scratch = of_cell + looks;
     for (size_t col = 0; col < cols; ++col) {
       const size_t cell = row * cols + col;
       const auto steps =
@@ -228,10 +238,22 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
 
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads) {
   const uint64_t rooms = sizeof(float) * static_cast<uint64_t>(threads) * grid.cells();
-  const uint64_t densities = sizeof(float) * looks * grid.cells();
-  return std::max({densities + PatchFrames::bytes(grid, looks, threads) + rooms,
-                   densities + ClutterColours::bytes(grid, looks, threads),
-                   patch_distance_bytes(grid, looks)});
+  const uint64_t patches = PatchFrames::bytes(grid, looks, threads) -
+                           sizeof(uint16_t) * PatchFrames::steps_of(grid, looks);
+  const uint64_t clutter = ClutterColours::bytes(grid, looks, threads);
+  // The lists are made beside those of the solve before.
+  return std::max({patches + rooms, clutter - std::min(clutter, steps_bytes(grid, looks)),
+                   StableFrames::bytes(grid, looks)});
+}
+
+StableFramesRoom::StableFramesRoom(const Grid& grid, uint64_t looks) {
+  density.reserve(looks * grid.cells());
+  steps.reserve(steps_bytes(grid, looks) / sizeof(uint16_t));
+  distance.reserve(looks * grid.cells());
+}
+
+uint64_t StableFramesRoom::bytes(const Grid& grid, uint64_t looks) {
+  return looks * grid.cells() * (sizeof(float) + sizeof(uint16_t)) + steps_bytes(grid, looks);
 }
 
 }  // namespace qdmd

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/large_vector.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
@@ -74,15 +75,28 @@ struct FirstLooks {
   std::vector<uint8_t> earlier_counts;
 };
 
+// Memory that solves use again and again: taking it anew costs more than what it is for.
+struct StableFramesRoom {
+  StableFramesRoom() = default;
+  // For up to so many looks; what is not needed is not touched. Throws std::bad_alloc.
+  StableFramesRoom(const Grid& grid, uint64_t looks);
+  static uint64_t bytes(const Grid& grid, uint64_t looks);
+
+  LargeVector<float> density;
+  LargeVector<uint16_t> steps, distance;
+};
+
 // frames: `count` pictures in one light, and a further one of the background in earlier windows
 // where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
 // around it that most frames share (the mode of the patches' density), corrected where another
 // frame's region fits its surroundings better: what stands still for long shows by its contour. If
-// something hides most of the picture, looks that have its colours count less.
+// something hides most of the picture, looks that have its colours count less. room: null: memory
+// is taken anew.
 StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
-                                const FirstLooks& first_looks = {});
-// The memory that it takes while it looks for them.
+                                const FirstLooks& first_looks = {},
+                                StableFramesRoom* room = nullptr);
+// The memory that it takes beside the room while it looks for them.
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads);
 
 }  // namespace qdmd
