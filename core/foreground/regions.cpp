@@ -49,7 +49,8 @@ bool comes_before(const Region& a, const Region& b) {
 
 // Foreground pixels of a row that are near to each other, or of all rows of a part.
 struct Pixels {
-  // right and bottom are one beyond: so what is at most `reach` apart has less than `reach` between.
+  // right and bottom are one beyond: so what is at most `reach` apart has less than `reach`
+  // between.
   int left = INT32_MAX, right = 0, top = INT32_MAX, bottom = 0;
   int area = 0;
   int64_t residual = 0;
