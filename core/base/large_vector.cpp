@@ -1,8 +1,12 @@
 #include "core/base/large_vector.h"
 
+#include <fcntl.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <cstddef>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <new>
 
@@ -16,21 +20,54 @@ std::align_val_t alignment_of(size_t bytes) {
   return std::align_val_t(bytes < kLargePage ? kLargeAlignment : kLargePage);
 }
 
+#ifdef MADV_HUGEPAGE
+// What the system says of large pages; nothing where it knows none.
+struct Said {
+  char text[64] = {};
+
+  explicit Said(const char* path) {
+    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file < 0) return;
+    if (read(file, text, sizeof(text) - 1) < 0) text[0] = 0;
+    close(file);
+  }
+};
+
+// Where they are for those who ask, and as large as we think: with a base of 64 KiB they have
+// hundreds of megabytes. Where everybody has them, nobody need ask.
+bool must_ask() {
+  static const bool must =
+      std::strstr(Said("/sys/kernel/mm/transparent_hugepage/enabled").text, "[madvise]") &&
+      std::strtoull(Said("/sys/kernel/mm/transparent_hugepage/hpage_pmd_size").text, nullptr, 10) ==
+          kLargePage;
+  return must;
+}
+#endif
+
+// Of whole large pages only: what is behind the last one would be taken with it. This is advice;
+// memory in small pages is as good.
+void ask(void* data, size_t bytes, bool large) {
+#ifdef MADV_HUGEPAGE
+  if (bytes >= kLargePage && must_ask())
+    madvise(data, bytes / kLargePage * kLargePage, large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
+#else
+  (void)data, (void)bytes, (void)large;
+#endif
+}
+
 }  // namespace
 
 void* take_large(size_t bytes) {
-  // The library rounds up to the alignment, past the largest number and back to 0.
+  // The C++ library rounds the size up to the alignment; that must not wrap around to 0.
   if (bytes > std::numeric_limits<ptrdiff_t>::max()) throw std::bad_alloc();
   void* const data = ::operator new(bytes, alignment_of(bytes));
-#ifdef MADV_HUGEPAGE
-  // Whole ones only: what is behind the last one would be taken with it. This is advice; memory in
-  // small pages is as good.
-  if (bytes >= kLargePage) madvise(data, bytes / kLargePage * kLargePage, MADV_HUGEPAGE);
-#endif
+  ask(data, bytes, true);
   return data;
 }
 
 void give_back_large(void* data, size_t bytes) noexcept {
+  // The C library may give it to somebody who touches little of it.
+  ask(data, bytes, false);
   ::operator delete(data, alignment_of(bytes));
 }
 

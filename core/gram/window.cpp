@@ -2,22 +2,14 @@
 
 #include <cstring>
 #include <limits>
-#include <new>
 
 namespace qdmd {
 namespace {
 
 constexpr size_t kAlignment = 64;
+static_assert(kAlignment <= kLargeAlignment);
 
 size_t padded(size_t pixels) { return (pixels + kAlignment - 1) / kAlignment * kAlignment; }
-
-LargeVector<uint8_t> memory_for(uint64_t bytes) {
-  LargeVector<uint8_t> memory;
-  // A vector calls what no machine has a length that is wrong.
-  if (bytes > memory.max_size()) throw std::bad_alloc();
-  memory.resize(bytes);
-  return memory;
-}
 
 }  // namespace
 
@@ -37,7 +29,7 @@ PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples)
       chroma_samples_(chroma_samples),
       chroma_size_(padded(chroma_samples)),
       reserved_(bytes(capacity, pixels, chroma_samples)),
-      data_(memory_for(reserved_)) {}
+      data_(static_cast<uint8_t*>(take_large(reserved_)), GiveBackLarge{reserved_}) {}
 
 void PlaneSlots::pad(int slot) {
   std::memset(plane(slot, 0) + pixels_, 0, plane_size_ - pixels_);

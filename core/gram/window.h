@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
 #include "core/base/channels.h"
 #include "core/base/large_vector.h"
@@ -39,8 +40,6 @@ struct KeptPicture {
 class PlaneSlots {
  public:
   PlaneSlots() = default;
-  PlaneSlots(PlaneSlots&&) = default;
-  PlaneSlots& operator=(PlaneSlots&&) = default;
   // Throws std::bad_alloc. The pages are touched slot by slot, so a short stream in a long window
   // costs only what it fills.
   PlaneSlots(int capacity, size_t pixels) : PlaneSlots(capacity, pixels, pixels) {}
@@ -63,8 +62,8 @@ class PlaneSlots {
   // Where no samples are shared, it may be nothing.
   const ChromaShape& shape() const { return shape_; }
 
-  const uint8_t* plane(int slot, int channel) const { return data_.data() + offset(slot, channel); }
-  uint8_t* plane(int slot, int channel) { return data_.data() + offset(slot, channel); }
+  const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
+  uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
   KeptPicture picture(int slot) const {
     const uint8_t* const planes[] = {plane(slot, 0), plane(slot, 1), plane(slot, 2)};
     return {planes, shape_};
@@ -89,7 +88,7 @@ class PlaneSlots {
   size_t pixels_ = 0, plane_size_ = 0, chroma_samples_ = 0, chroma_size_ = 0;
   ChromaShape shape_;
   uint64_t reserved_ = 0;
-  LargeVector<uint8_t> data_;
+  std::unique_ptr<uint8_t[], GiveBackLarge> data_;
 };
 
 // Up to `capacity` snapshots of `pixels` pixels, a ring of slots. A snapshot is kept in the slot

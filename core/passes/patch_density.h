@@ -37,10 +37,11 @@ inline int patch_cells(const Grid& grid, int row, int col, int radius = kNearRad
 // max(0, 1 - d(s, t) / kSimilar).
 class PatchFrames {
  public:
-  // room: where their steps are kept, as many as steps_of() says, until the next ones; null: in
-  // memory of its own.
+  // room: where their steps are, as many as steps_of() says: good until somebody else uses it;
+  // null: in memory of its own.
   PatchFrames(const Grid& grid, const GridPictures& frames, int count, Pool* pool,
               LargeVector<uint16_t>* room = nullptr);
+  PatchFrames(PatchFrames&&) = default;  // not copied: first_ points into a room
   // Without a room.
   static uint64_t bytes(const Grid& grid, uint64_t count, int threads);
   static uint64_t steps_of(const Grid& grid, uint64_t count);

@@ -2,13 +2,15 @@
 #include "core/base/large_vector.h"
 
 #include <gtest/gtest.h>
-#include <sys/stat.h>
+#include <sys/mman.h>
 
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "core/gram/window.h"
 
@@ -35,10 +37,27 @@ std::string flags_of(const void* at) {
   return {};
 }
 
-bool knows_large_pages() {
-  struct stat state;
-  return stat("/sys/kernel/mm/transparent_hugepage", &state) == 0 &&
-         !flags_of(std::string(100, ' ').data()).empty();
+bool wants_large_pages(const void* at) { return flags_of(at).find(" hg ") != std::string::npos; }
+
+// Where the system gives large pages to those who ask, and tells; a system that is not there but
+// pretended may do neither.
+bool has_large_pages_for_those_who_ask() {
+  std::string said;
+  std::ifstream enabled("/sys/kernel/mm/transparent_hugepage/enabled");
+  std::getline(enabled, said);
+  if (said.find("[madvise]") == std::string::npos) return false;
+  size_t size = 0;
+  std::ifstream("/sys/kernel/mm/transparent_hugepage/hpage_pmd_size") >> size;
+  void* const probe =
+      mmap(nullptr, 2 * kLargePage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (size != kLargePage || probe == MAP_FAILED) return false;
+  const bool before = wants_large_pages(probe);
+  madvise(probe, 2 * kLargePage, MADV_HUGEPAGE);
+  const bool after = wants_large_pages(probe);
+  munmap(probe, 2 * kLargePage);
+  // The C library may ask for all that it has.
+  const auto plain = std::make_unique_for_overwrite<uint8_t[]>(5 * kLargePage);
+  return after && !before && !wants_large_pages(plain.get() + 2 * kLargePage);
 }
 
 TEST(LargeVector, BeginsAtWholeVectorsAndLargePages) {
@@ -53,13 +72,27 @@ TEST(LargeVector, BeginsAtWholeVectorsAndLargePages) {
 }
 
 TEST(LargeVector, AsksForLargePagesAsFarAsTheyAreWhole) {
-  if (!knows_large_pages()) GTEST_SKIP() << "this system has no large pages that one could ask for";
+  if (!has_large_pages_for_those_who_ask()) GTEST_SKIP() << "no large pages for those who ask";
   const LargeVector<uint8_t> two_and_a_half(5 * kLargePage / 2, 1);
   for (const size_t at : {size_t{0}, kLargePage, 2 * kLargePage - 1})
-    EXPECT_NE(flags_of(two_and_a_half.data() + at).find(" hg "), std::string::npos) << at;
-  EXPECT_EQ(flags_of(two_and_a_half.data() + 2 * kLargePage).find(" hg "), std::string::npos);
+    EXPECT_TRUE(wants_large_pages(two_and_a_half.data() + at)) << at;
+  EXPECT_FALSE(wants_large_pages(two_and_a_half.data() + 2 * kLargePage));
   const LargeVector<uint8_t> small(kLargePage - 1, 1);
-  EXPECT_EQ(flags_of(small.data() + kLargePage / 2).find(" hg "), std::string::npos);
+  EXPECT_FALSE(wants_large_pages(small.data() + kLargePage / 2));
+}
+
+// What the C library keeps for others is as it was.
+TEST(LargeVector, LeavesNoWishBehind) {
+  if (!has_large_pages_for_those_who_ask()) GTEST_SKIP() << "no large pages for those who ask";
+  // From its second round on, the library takes such memory from what it keeps.
+  for (int round = 0; round < 3; ++round) {
+    const LargeVector<uint8_t> large(4 * kLargePage, 1);
+    EXPECT_TRUE(wants_large_pages(large.data()));
+  }
+  for (int i = 0; i < 20; ++i) {
+    const auto plain = std::make_unique_for_overwrite<uint8_t[]>(kLargePage / 3);
+    EXPECT_FALSE(wants_large_pages(plain.get() + kLargePage / 6));
+  }
 }
 
 TEST(LargeVector, HoldsWhatItIsTold) {

@@ -14,6 +14,7 @@
 #include "core/learn/robust/clutter.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/scene_watch.h"
+#include "core/learn/robust/stable_frames.h"
 #include "core/learn/robust/standing_looks.h"
 #include "core/passes/fill.h"
 #include "core/passes/grid.h"
@@ -111,6 +112,8 @@ TEST_P(PartsMemory, OfAWindow) {
     expect(
         "PatchFrames", PatchFrames::bytes(grid, count, 1),
         [&] { PatchFrames part(grid, frames, snapshots, &pool); }, kLittle);
+    expect("StableFramesRoom", StableFramesRoom::bytes(grid, count),
+           [&] { StableFramesRoom part(grid, count); });
     const std::vector<int> reference(grid.cells(), 0);
     expect(
         "patch_distance", patch_distance_bytes(grid, count),

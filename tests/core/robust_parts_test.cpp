@@ -494,6 +494,27 @@ StableFrames with_recollection(const CellScene& scene, float weight) {
   return find_stable_frames(scene.grid, scene.frames, scene.count - 1, &earlier, &pool);
 }
 
+// Whatever solves before left in it, of fewer frames or more.
+TEST(StableFramesRooms, ServeOneSolveAfterAnother) {
+  CellScene scene(41);
+  for (int t = 0; t < 40; ++t) scene.box(t, 8, 12, 8, 190);
+  const Recollection earlier = {std::vector<float>(scene.grid.cells(), 20.0f),
+                                std::vector<float>(scene.grid.cells(), kSimilar / 2)};
+  Pool pool(2);
+  StableFramesRoom room(scene.grid, 30);
+  room.density.assign(30 * scene.grid.cells(), 1e9f);
+  room.steps.assign(room.steps.capacity(), 0xffff);
+  for (const int count : {30, 7, 40, 1, 29, 40})
+    for (const Recollection* known : {static_cast<const Recollection*>(nullptr), &earlier}) {
+      const StableFrames anew = find_stable_frames(scene.grid, scene.frames, count, known, &pool);
+      const StableFrames again =
+          find_stable_frames(scene.grid, scene.frames, count, known, &pool, {}, &room);
+      EXPECT_EQ(again.limit, anew.limit) << count;
+      for (size_t cell = 0; cell < scene.grid.cells(); ++cell)
+        ASSERT_TRUE(std::ranges::equal(again.of_cell[cell], anew.of_cell[cell])) << count;
+    }
+}
+
 // It stands still in all frames of the window.
 TEST(Recollections, ShowWhatIsBehindWhoeverStandsStill) {
   CellScene scene(41);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <span>
 
 #include "core/learn/robust/clutter.h"
@@ -133,7 +132,7 @@ void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
   constexpr int kRounds = 3;
   ClutterColours colours(grid, frames, count, pool);
   if (!colours.hides_much(density, *from)) return;
-  // Steps are not needed meanwhile, and this takes as much.
+  // Steps are not needed meanwhile, and this takes less.
   LargeVector<uint16_t>().swap(room->steps);
   for (int round = 0; round < kRounds; ++round) {
     colours.learn(*from);
