@@ -11,6 +11,7 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/gram/window.h"
 
@@ -89,9 +90,11 @@ TEST(LargeVector, LeavesNoWishBehind) {
     const LargeVector<uint8_t> large(4 * kLargePage, 1);
     EXPECT_TRUE(wants_large_pages(large.data()));
   }
+  // All of it: they stay until the last one is looked at.
+  std::vector<std::unique_ptr<uint8_t[]>> plain;
   for (int i = 0; i < 20; ++i) {
-    const auto plain = std::make_unique_for_overwrite<uint8_t[]>(kLargePage / 3);
-    EXPECT_FALSE(wants_large_pages(plain.get() + kLargePage / 6));
+    plain.push_back(std::make_unique_for_overwrite<uint8_t[]>(kLargePage / 3));
+    EXPECT_FALSE(wants_large_pages(plain.back().get() + kLargePage / 6)) << i;
   }
 }
 

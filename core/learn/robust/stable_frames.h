@@ -75,7 +75,7 @@ struct FirstLooks {
   std::vector<uint8_t> earlier_counts;
 };
 
-// Memory that solves use again and again: taking it anew costs more than what it is for.
+// Memory that solves use again: taken anew, each of its pages would cost a visit to the kernel.
 struct StableFramesRoom {
   StableFramesRoom() = default;
   // For up to so many looks; what is not needed is not touched. Throws std::bad_alloc.
