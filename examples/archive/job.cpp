@@ -259,7 +259,10 @@ class Job {
       if (!options_.wanted[which].is_picture()) continue;
       engine_.write_background(kept_view(false));
       const std::span<const uint8_t> picture = gather(false);
-      if (writes()) outputs_->write_picture(which, done_.windows, picture);
+      if (!writes()) continue;
+      const auto start = Clock::now();
+      outputs_->write_picture(which, done_.windows, picture);
+      encoding_ += since(start);
     }
   }
 
@@ -335,6 +338,7 @@ class Job {
     add("processor-seconds", in_seconds(usage.ru_utime) + in_seconds(usage.ru_stime) -
                                  (team_ ? team_->processor_seconds() : 0));
     add("most-memory", static_cast<double>(usage.ru_maxrss) * 1024);
+    add("page-faults", static_cast<double>(usage.ru_minflt));
     add("rows", engine_.configured() ? engine_.band().own_rows() : 0);
     add("rows-kept", engine_.configured() ? engine_.band().rows() : 0);
     const auto frames = static_cast<double>(std::max<int64_t>(frames_, 1));

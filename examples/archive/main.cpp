@@ -1,5 +1,6 @@
 // qdmd-archive: backgrounds, masks and foregrounds of recordings whose window no machine holds.
 #include <gst/gst.h>
+#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -145,10 +146,23 @@ int fail(const MpiTeam* team, const char* what, bool alike) {
   return alike ? 2 : 1;
 }
 
+// The C library gives the memory of frames back to the system when they are freed, as blocks or
+// from the end of its heap: each frame is new memory then, which can take longer than the window's
+// mathematics. With one of both limits it is worse than with none. One heap, because a frame is
+// freed by another thread than took it.
+void keep_memory_of_frames() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 1 << 28);  // more than a frame of 8K has
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  mallopt(M_ARENA_MAX, 1);
+#endif
+}
+
 }  // namespace
 
 // Ends with 0; 1 where something failed; 2 where options are wrong.
 int main(int argc, char** argv) {
+  keep_memory_of_frames();
   std::unique_ptr<MpiTeam> team;
   try {
     if (MpiTeam::is_job()) team = std::make_unique<MpiTeam>(&argc, &argv);

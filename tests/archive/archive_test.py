@@ -344,6 +344,19 @@ def memory_of_processes(folder):
             assert max(shares) <= 1 / processes + 0.1, f'{method}, {processes}: {shares}'
 
 
+def memory_of_frames_is_used_again(folder):
+    clip, faults = folder / 'frames.mkv', []
+    make_clip(clip, 40, 1280, 721)
+    for times in (1, 3):
+        run(folder, 0, *[clip] * times, '--background', folder / 'f.png', '--window', 10,
+            '--report', folder / 'f.json', '--quiet')
+        faults += json.loads((folder / 'f.json').read_text())['of-process']['page-faults']
+    # One frame as it is decoded has 338 pages, and many frames are on their way at once.
+    more = (faults[1] - faults[0]) / 80
+    print(f'# {more:.1f} page faults a frame', flush=True)
+    assert more < 30, f'{faults}: {more} page faults a frame'
+
+
 def failing_process(folder):
     """One process's file is another: the job ends, and says why."""
     def two(first, second):
@@ -394,7 +407,8 @@ def main():
     cases += [(check.__name__.replace('_', ' '), check)
               for check in (files_and_pictures, more_outputs, killed_and_resumed,
                             killed_while_parts_are_removed, resumed_with_other_options,
-                            memory_of_processes, failing_process, errors)]
+                            memory_of_processes, memory_of_frames_is_used_again,
+                            failing_process, errors)]
     words = sys.argv[3:]
     cases = [case for case in cases if not words or any(word in case[0] for word in words)]
     with tempfile.TemporaryDirectory() as name:
