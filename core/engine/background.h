@@ -84,6 +84,11 @@ class Background {
   void learn() { state_ = State::learnt; }
   // Learner::mend(), of the L in use.
   void mend(const Learner::Compared& frame) { learner_->mend(frame, &model()); }
+  // Learner::look_ahead(), of the L in use. used: frames wait that it is the background of.
+  void look_ahead(const Learner::Compared& frame, bool used) {
+    const bool mends = known_ && used && state_ == State::learnt;
+    learner_->look_ahead(frame, mends ? &model() : nullptr);
+  }
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 

@@ -36,10 +36,22 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
              collection_->not_added >= std::min(kGroup, window_size_)) {
     add_group();
   }
-  if (queue->pending < window_size_ + late_frames_) return true;
-  queue->ready = 1;
-  if (next_to_leave(*queue) == shown_.end) advance();
+  if (queue->pending == window_size_ + late_frames_) {
+    queue->ready = 1;
+    if (next_to_leave(*queue) == shown_.end) advance();
+  }
+  look_ahead(*queue);
   return true;
+}
+
+// With the newest frame: it may show what is behind the background of those that wait.
+void BatchSchedule::look_ahead(const Queue& queue) {
+  const int count = std::min(frames().size(), Learner::kMendingFrames);
+  const int64_t next = next_to_leave(queue);
+  const bool of_this_scene = next < shown_.end && !(collection_ && collection_->scene);
+  background().look_ahead({SnapshotRange(frames().window()).newest(count), count - 1, taken() - 1,
+                           static_cast<double>(next - shown_.time_zero)},
+                          of_this_scene);
 }
 
 // No frame waits.

@@ -94,7 +94,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, AnotherScene,
 TEST_P(AnotherScene, IsLearntFromItsFirstFramesOn) {
   const auto before = view(1), after = view(2);
   // In the middle of a window, at its beginning, and at its end.
-  for (int cut : {100, 120, 118, 81}) {
+  for (int cut : {100, 120, 118, 81, 60}) {
     SCOPED_TRACE(cut);
     const auto clip = film(200, [&](int t, size_t i) { return (t < cut ? before : after)[i]; });
     const Seen seen = run(clip, options());

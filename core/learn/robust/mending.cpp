@@ -24,20 +24,36 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
     std::vector<int> uncovered = looks_.uncovered(background);
     if (looks_.any_news()) calm_ = 0;
     if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
-    mend(uncovered, frame, light, model);
+    mend(uncovered, looks_, frame, light, model);
   }
   if (absorb_frames_ == 0) return;
   const std::vector<int>& stood = looks_.stood(background, absorb_frames_);
   for (int cell : stood) absorbed_.add(cell, looks_.since(cell));
-  mend(stood, frame, light, model);
+  mend(stood, looks_, frame, light, model);
 }
 
-void RobustLearner::mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
-                         BackgroundModel* model) {
+void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
+  if (!ahead_.follows()) return;
+  const int slot = frame.around.slot(frame.at);
+  const GridFrames& cells = room_.frames->cells();
+  const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
+  const Gain light = model ? this->light(slot) : kSameLight;
+  ahead_.follow(now, light, frame.number);
+  if (!model || !ahead_.knows_background()) return;
+  // What has stood for so long is background, even if it goes.
+  if (absorb_frames_ > 0 && frame.number - stream_from_ >= absorb_frames_) return;
+  const float* const background[3] = {background_cells_.plane(published_, 0),
+                                      background_cells_.plane(published_, 1),
+                                      background_cells_.plane(published_, 2)};
+  mend(ahead_.uncovered(background), ahead_.looks(), frame, light, model);
+}
+
+void RobustLearner::mend(const std::vector<int>& cells, const StandingLooks& looks,
+                         const Compared& frame, const Gain& light, BackgroundModel* model) {
   if (cells.empty()) return;
   calm_ = 0;
   model->freeze_but_for_light(frame.t);
-  replace(cells, frame.around.every(2), light, model);
+  replace(cells, looks, frame.around.every(2), light, model);
   if (options_.low_bits() > 0)
     replace_deep(cells, room_.frames->whole(frame.around.every(2)), light, model);
 }
@@ -79,8 +95,9 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
 }
 
 // The median of the frames in place of the background of these cells.
-void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& frames,
-                            const Gain& light, BackgroundModel* model) {
+void RobustLearner::replace(const std::vector<int>& cells, const StandingLooks& looks,
+                            const SnapshotRange& frames, const Gain& light,
+                            BackgroundModel* model) {
   const auto count = static_cast<size_t>(frames.size());
   MedianFrame at[kMendingFrames] = {};  // of blocks of one row
   for (size_t i = 0; i < count; ++i)
@@ -105,7 +122,7 @@ void RobustLearner::replace(const std::vector<int>& cells, const SnapshotRange& 
         model->replace(first, width, out);
       }
     for (int c = 0; c < kChannels; ++c)
-      background_cells_.plane(published_, c)[cell] = looks_.level(cell, c);
+      background_cells_.plane(published_, c)[cell] = looks.level(cell, c);
   }
 }
 

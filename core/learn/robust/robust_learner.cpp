@@ -128,8 +128,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, shape(), grid_) +
-      StandingLooks::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
-      static_cast<uint64_t>(window_size) * sizeof(Gain);
+      StandingLooks::bytes(grid_) + LookAhead::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) +
+      SceneWatch::bytes(grid_) + static_cast<uint64_t>(window_size) * sizeof(Gain);
   // A scene that was left: levels and limits, and the same once more for windows to come. Where it
   // is back, there are two for a moment.
   const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
@@ -177,6 +177,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = EarlierWindow(grid_);
   looks_ = StandingLooks(grid_);
+  ahead_ = LookAhead(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
   stable_room_ = StableFramesRoom(grid_, most_looks(room.window_size, room.models));
@@ -195,6 +196,7 @@ void RobustLearner::forget() {
   earlier_.forget();
   memory_.forget();
   looks_.forget();
+  ahead_.forget();
   absorbed_.forget();
   scene_.forget();
   other_scene_ = scene_begins_ = false;
@@ -206,6 +208,7 @@ void RobustLearner::publish() {
   // Not while the solve runs: frames that come beside it mend what it would be compared with.
   calm_ = is_calm() ? calm_ + 1 : 0;
   published_ = 1 - published_;
+  ahead_.publish(alone_, stable_, start_frames_);
   if (!std::exchange(scene_begins_, false)) return;
   looks_.forget();
   other_scene_ = false;
@@ -228,6 +231,7 @@ void RobustLearner::begin_scene() {
   earlier_.forget();
   memory_.forget();
   absorbed_.forget();
+  ahead_.forget();
   stream_from_ = -1;
   calm_ = 0;
   scene_begins_ = true;
@@ -267,6 +271,7 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   GridFrames here;
   const int old = memory_.older_than(first_number());
   const bool recalls = old > 0 || earlier_.known();
+  alone_ = !recalls;
   gains_ = light_of(frames, m, room_.pool, recalls ? &here : nullptr);
 
   const int of_window = std::min(m, parameters_.start_frames);

@@ -12,6 +12,7 @@
 #include "core/learn/robust/earlier_window.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
+#include "core/learn/robust/look_ahead.h"
 #include "core/learn/robust/scene_watch.h"
 #include "core/learn/robust/stable_frames.h"
 #include "core/learn/robust/standing_looks.h"
@@ -88,6 +89,7 @@ class RobustLearner : public Learner {
   void publish() override;
 
   void mend(const Compared& frame, BackgroundModel* model) override;
+  void look_ahead(const Compared& frame, BackgroundModel* model) override;
   void set_absorb_frames(int64_t frames) override { absorb_frames_ = frames; }
 
   SceneSeen scene_of(int slot) override;
@@ -123,10 +125,10 @@ class RobustLearner : public Learner {
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames();
   void keep_some();
-  void mend(const std::vector<int>& cells, const Compared& frame, const Gain& light,
-            BackgroundModel* model);
-  void replace(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
-               BackgroundModel* model);
+  void mend(const std::vector<int>& cells, const StandingLooks& looks, const Compared& frame,
+            const Gain& light, BackgroundModel* model);
+  void replace(const std::vector<int>& cells, const StandingLooks& looks,
+               const SnapshotRange& frames, const Gain& light, BackgroundModel* model);
   bool is_calm() const;
   void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
                     BackgroundModel* model) const;
@@ -149,6 +151,7 @@ class RobustLearner : public Learner {
   EarlierWindow earlier_;
   FrameMemory memory_;
   StandingLooks looks_;  // of the frames that were compared with the background in use
+  LookAhead ahead_;      // of those that came
   int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
   Absorbed absorbed_, absorbed_now_;           // so far, and those that the solve knows of
   SceneWatch scene_;
@@ -165,6 +168,7 @@ class RobustLearner : public Learner {
   int64_t stream_from_ = -1;  // the first frame since forget(); -1: none was solved
   uint64_t frames_seen_ = 0;  // that the store had taken by then
   int start_frames_ = 0;
+  bool alone_ = false;  // no window was known before
   StableFrames stable_;
   StableFramesRoom stable_room_;
   ReferencePicture reference_;

@@ -140,7 +140,8 @@ void StandingLooks::take_next(size_t at) {
   }
 }
 
-const std::vector<int>& StandingLooks::uncovered(const float* const background[3]) {
+const std::vector<int>& StandingLooks::uncovered(const float* const background[3],
+                                                 const Counts& counts) {
   found_.clear();
   news_ = 0;
   if (std::min(grid_.rows, grid_.cols) < 4) return found_;
@@ -156,7 +157,7 @@ const std::vector<int>& StandingLooks::uncovered(const float* const background[3
   CellRegions regions(grid_);
   const auto& found = regions.find(differs_);
   for (size_t region = 0; region < found.size(); ++region)
-    if (found[region].size() >= kLeastRegion &&
+    if (found[region].size() >= kLeastRegion && (!counts || counts(found[region])) &&
         Contour(grid_, regions, static_cast<int>(region), found[region])
             .is_weaker(look, background))
       found_.insert(found_.end(), found[region].begin(), found[region].end());

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/learn/robust/contour.h"
@@ -33,7 +34,10 @@ class StandingLooks {
   // Good until the next call of either:
   // What was uncovered: cells whose look has lasted for kSteady frames and is not the background's,
   // in regions where the background has the stronger contour.
-  const std::vector<int>& uncovered(const float* const background[3]);
+  // counts: null, or what says of a region of such cells whether it may be one.
+  using Counts = std::function<bool(const std::vector<int>& region)>;
+  const std::vector<int>& uncovered(const float* const background[3],
+                                    const Counts& counts = nullptr);
   // True where uncovered() saw enough cells whose look is not the background's and has come within
   // the last kNewsFrames frames, be it uncovered or something that stops.
   bool any_news() const { return news_ >= kLeastNews; }

@@ -1,0 +1,189 @@
+// Who stands through the first window and leaves is foreground in the frames that still wait then.
+#include "core/learn/robust/look_ahead.h"
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "tests/core/robust_util.h"
+
+namespace qdmd::test {
+namespace {
+
+constexpr int kWidth = 96, kHeight = 64, kWindow = 50, kFrames = 150;
+constexpr size_t kPixels = size_t{kWidth} * kHeight;
+
+bool in_bag(int x, int y) { return x >= 40 && x < 64 && y >= 20 && y < 44; }
+int floor_level(size_t channel, int x, int y) {
+  return 90 + 10 * static_cast<int>(channel) + x / 4 + y / 2;
+}
+
+// A bag lies there in the frames that `lies` says, in the light that `light` says. Somebody walks
+// by. Cells are pixels here: noise is that of their means in larger pictures.
+Clip bag(
+    const std::function<bool(int frame)>& lies,
+    const std::function<double(int frame)>& light = [](int) { return 1.0; }) {
+  Clip clip(kPixels, kFrames);
+  std::mt19937 rng(417);
+  std::normal_distribution<double> noise(0, 1);
+  for (int t = 0; t < kFrames; ++t) {
+    const int left = 2 * (t % 80) - 20;
+    for (size_t i = 0; i < 3 * kPixels; ++i) {
+      const size_t channel = i / kPixels;
+      const int x = static_cast<int>(i % kPixels) % kWidth,
+                y = static_cast<int>(i % kPixels) / kWidth;
+      int level = floor_level(channel, x, y);
+      if (lies(t) && in_bag(x, y)) level = 30 + (x + y) % 7;
+      if (x >= left && x < left + 8 && y < 18) level = channel == 0 ? 230 : 60;
+      clip.frames[static_cast<size_t>(t)][i] =
+          static_cast<uint8_t>(std::clamp(std::lround(light(t) * level + noise(rng)), 0l, 255l));
+    }
+  }
+  return clip;
+}
+
+// Of each frame.
+struct Left {
+  std::vector<double> white;  // the share of the bag's middle that is foreground
+  std::vector<double> red;    // the background there, mean
+};
+
+class LookAheadTest : public testing::TestWithParam<bool> {
+ protected:
+  EngineOptions options() const {
+    EngineOptions options = robust_of(kWindow);
+    // Frames that come fast: a window is solved while others come.
+    if (GetParam()) options.frame_rate = 1e4;
+    return options;
+  }
+  static Left run(const Clip& clip, const EngineOptions& options, int64_t absorb_frames = 0) {
+    Left left;
+    Engine engine;
+    EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+    engine.set_absorb_frames(absorb_frames);
+    const auto take = [&] {
+      while (engine.ready()) {
+        PackedPicture mask(kWidth, kHeight), background(kWidth, kHeight);
+        engine.write(Output::mask, {}, mask.out());
+        engine.pop(Output::background, background.out());
+        double hits = 0, sum = 0, pixels = 0;
+        for (int y = 22; y < 42; ++y)
+          for (int x = 42; x < 62; ++x) {
+            const auto at = static_cast<size_t>(y * kWidth + x);
+            hits += mask.at(0, at) > 0;
+            sum += background.at(0, at);
+            ++pixels;
+          }
+        left.white.push_back(hits / pixels);
+        left.red.push_back(sum / pixels);
+      }
+    };
+    for (const auto& frame : clip.frames) {
+      PackedPicture picture(kWidth, kHeight);
+      picture.fill(frame);
+      EXPECT_TRUE(engine.push(picture.in()).ok());
+      take();
+    }
+    EXPECT_TRUE(engine.drain().ok());
+    take();
+    EXPECT_EQ(left.white.size(), size_t{kFrames});
+    return left;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Beside, LookAheadTest, testing::Values(false, true),
+                         [](const auto& beside) { return beside.param ? "Beside" : "AtOnce"; });
+
+// The floor in the middle of the bag.
+constexpr double kFloor = 90 + 51.5 / 4 + 31.5 / 2, kBag = 33;
+
+TEST_P(LookAheadTest, WhatLeavesAfterTheFirstWindowWasForeground) {
+  constexpr int kLeaves = 60;
+  const Left left = run(bag([](int t) { return t < kLeaves; }), options());
+  // Its place is known when it was seen for StandingLooks::kSteady frames; window - 1 frames wait.
+  const int known = kLeaves + StandingLooks::kSteady - (kWindow - 1) + 1;
+  for (int t = known; t < kFrames; ++t) {
+    EXPECT_NEAR(left.red[static_cast<size_t>(t)], kFloor, 3) << t;
+    if (t < kLeaves)
+      EXPECT_GT(left.white[static_cast<size_t>(t)], 0.9) << t;
+    else
+      EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
+  }
+}
+
+TEST_P(LookAheadTest, WhatStaysIsBackground) {
+  // In other light from frame 60 on, too.
+  for (double light : {1.0, 0.7}) {
+    const Left left =
+        run(bag([](int) { return true; }, [&](int t) { return t < 60 ? 1 : light; }), options());
+    for (int t = 0; t < kFrames; ++t) {
+      EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t << ", light " << light;
+      EXPECT_NEAR(left.red[static_cast<size_t>(t)], (t < 60 ? 1 : light) * kBag, 4) << t;
+    }
+  }
+}
+
+TEST_P(LookAheadTest, WhatComesLaterIsForegroundAndStaysIt) {
+  const Left left = run(bag([](int t) { return t >= 60; }), options());
+  for (int t = 0; t < kFrames; ++t) {
+    EXPECT_NEAR(left.red[static_cast<size_t>(t)], kFloor, 3) << t;
+    if (t < 60)
+      EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
+    else
+      EXPECT_GT(left.white[static_cast<size_t>(t)], 0.9) << t;
+  }
+}
+
+// Later windows know what was seen before: what they took for background was there all the time.
+TEST_P(LookAheadTest, OnlyTheFirstWindowIsRevised) {
+  const Left left = run(bag([](int t) { return t < 110; }), options());
+  for (int t = 0; t < 100; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
+}
+
+// People who say that what stands for 40 frames is background mean this, too.
+TEST_P(LookAheadTest, WhatWasAbsorbedIsNoForeground) {
+  const Left left = run(bag([](int t) { return t < 60; }), options(), 40);
+  for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
+}
+
+TEST_P(LookAheadTest, IsTheSameForAnyNumberOfThreads) {
+  EngineOptions one = options(), three = options();
+  one.threads = 1, three.threads = 3;
+  const Clip clip = bag([](int t) { return t < 60; });
+  const Left a = run(clip, one), b = run(clip, three);
+  EXPECT_EQ(a.white, b.white);
+  EXPECT_EQ(a.red, b.red);
+}
+
+// A region of 6 x 6 cells, which all but the last frames of the window show, or some.
+TEST(LookAhead, AsksThatItStoodThere) {
+  const Grid grid(240, 240, 24);
+  ASSERT_EQ(grid.cells(), size_t{24} * 24);
+  const auto is_in = [&](size_t cell) {
+    const int row = static_cast<int>(cell) / grid.cols, col = static_cast<int>(cell) % grid.cols;
+    return row >= 8 && row < 14 && col >= 8 && col < 14;
+  };
+  std::vector<float> with(grid.cells(), 100), without(grid.cells(), 100);
+  for (size_t cell = 0; cell < grid.cells(); ++cell)
+    if (is_in(cell)) with[cell] = 180;
+  const float* const background[3] = {with.data(), with.data(), with.data()};
+  const float* const frame[3] = {without.data(), without.data(), without.data()};
+  constexpr int kSeen = 50;
+  for (int shown : {50, 25, 21, 19, 10, 0}) {
+    StableFrames stable{FrameLists(grid.cells(), kSeen), {}};
+    for (size_t cell = 0; cell < grid.cells(); ++cell)
+      for (int t = 0; t < (is_in(cell) ? shown : kSeen); ++t) stable.of_cell.add(cell, t);
+    LookAhead ahead(grid);
+    ahead.publish(true, stable, kSeen);
+    for (int t = 0; t < StandingLooks::kSteady; ++t) ahead.follow(frame, kSameLight, t);
+    EXPECT_EQ(ahead.uncovered(background).size(), shown >= 20 ? 36u : 0u) << shown;
+    // Later windows are not looked at, until the next stream.
+    ahead.publish(false, stable, kSeen);
+    EXPECT_FALSE(ahead.follows());
+    ahead.forget();
+    EXPECT_TRUE(ahead.follows());
+    EXPECT_FALSE(ahead.knows_background());
+  }
+}
+
+}  // namespace
+}  // namespace qdmd::test
