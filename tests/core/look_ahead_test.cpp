@@ -110,6 +110,17 @@ TEST_P(LookAheadTest, WhatLeavesAfterTheFirstWindowWasForeground) {
   }
 }
 
+// Its place is seen in other light than the frames that wait have.
+TEST_P(LookAheadTest, KeepsTheLightOfFrames) {
+  constexpr int kLeaves = 65, kDusk = 58;
+  const Left left = run(
+      bag([](int t) { return t < kLeaves; }, [](int t) { return t < kDusk ? 1 : 0.7; }), options());
+  for (int t = kLeaves + StandingLooks::kSteady - (kWindow - 1) + 1; t < kWindow; ++t) {
+    EXPECT_NEAR(left.red[static_cast<size_t>(t)], kFloor, 3) << t;
+    EXPECT_GT(left.white[static_cast<size_t>(t)], 0.9) << t;
+  }
+}
+
 TEST_P(LookAheadTest, WhatStaysIsBackground) {
   // In other light from frame 60 on, too.
   for (double light : {1.0, 0.7}) {
@@ -142,6 +153,14 @@ TEST_P(LookAheadTest, OnlyTheFirstWindowIsRevised) {
 // People who say that what stands for 40 frames is background mean this, too.
 TEST_P(LookAheadTest, WhatWasAbsorbedIsNoForeground) {
   const Left left = run(bag([](int t) { return t < 60; }), options(), 40);
+  for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
+}
+
+// Windows of an archive are solved by themselves, so that a job can go on anywhere.
+TEST_P(LookAheadTest, WindowsThatRememberNothingAreNotRevised) {
+  EngineOptions options = this->options();
+  options.remembers = false;
+  const Left left = run(bag([](int t) { return t < 60; }), options);
   for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
 }
 

@@ -33,7 +33,8 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
 }
 
 void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
-  if (!ahead_.follows()) return;
+  // Windows that know nothing of each other are given nothing of each other.
+  if (parameters_.earlier_share <= 0 || !ahead_.follows()) return;
   const int slot = frame.around.slot(frame.at);
   const GridFrames& cells = room_.frames->cells();
   const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
