@@ -43,7 +43,7 @@ long() {
   meson setup "${again[@]}" "$build" -Db_sanitize="$kind" -Db_lundef=false -Doptimization=1 \
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
-    thread) names=(pool side_thread workers decision band gram_slices live live_schedule absorb another_scene) ;;
+    thread) names=(pool side_thread workers decision band gram_slices live live_schedule absorb look_ahead another_scene) ;;
     *) names=(engine kernel passes grid chroma digits picture combine gram gram_slices robust_fill median_picture robust_parts pool side_thread workers resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done

@@ -40,18 +40,22 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
     queue->ready = 1;
     if (next_to_leave(*queue) == shown_.end) advance();
   }
-  look_ahead(*queue);
+  look_ahead(*queue, freeze);
   return true;
 }
 
 // With the newest frame: it may show what is behind the background of those that wait.
-void BatchSchedule::look_ahead(const Queue& queue) {
+void BatchSchedule::look_ahead(const Queue& queue, bool freeze) {
   const int count = std::min(frames().size(), Learner::kMendingFrames);
   const int64_t next = next_to_leave(queue);
-  const bool of_this_scene = next < shown_.end && !(collection_ && collection_->scene);
+  // What somebody is about to hold, or what was loaded, stays as it is.
+  const auto learns = [](const auto& window) { return !window || window->state == State::learnt; };
+  const bool used = next < shown_.end && !freeze && !loaded_ && learns(waiting_) &&
+                    learns(collection_) &&
+                    !(collection_ && (collection_->freeze || collection_->scene));
   background().look_ahead({SnapshotRange(frames().window()).newest(count), count - 1, taken() - 1,
                            static_cast<double>(next - shown_.time_zero)},
-                          of_this_scene);
+                          used);
 }
 
 // No frame waits.

@@ -68,7 +68,7 @@ class BatchSchedule : public Schedule {
   int collected() const { return collection_ ? static_cast<int>(taken() - collection_->begin) : 0; }
   int64_t next_to_leave(const Queue& queue) const { return taken() - queue.pending; }
 
-  void look_ahead(const Queue& queue);
+  void look_ahead(const Queue& queue, bool freeze);
   void begin_stream();
   void decide();
   void add_group();

@@ -127,9 +127,10 @@ class Learner {
     bool live = false;
   };
   virtual void mend(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
-  // With each frame that comes while others wait to be compared (batch), in order. Where frames
-  // show what is behind the background in use, `model` (null: there is none that they may mend),
-  // frames that are compared from now on find that. t: of the one that is compared next.
+  // With each frame that comes, in order, where frames wait to be compared (batch). Where it and
+  // those before it show what is behind the background in use, `model` (null: there is none that
+  // they may mend), frames that are compared from now on find that. t: of the one that is compared
+  // next.
   virtual void look_ahead(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
   // Takes effect with the next frame. 0: never.
   virtual void set_absorb_frames(int64_t) {}

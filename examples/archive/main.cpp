@@ -152,7 +152,8 @@ int fail(const MpiTeam* team, const char* what, bool alike) {
 // freed by another thread than took it.
 void keep_memory_of_frames() {
 #ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 1 << 28);  // more than a frame of 8K has
+  // More than a frame of 8K has; versions before 2.35 take less.
+  if (!mallopt(M_MMAP_THRESHOLD, 1 << 28) && !mallopt(M_MMAP_THRESHOLD, 1 << 25)) return;
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   mallopt(M_ARENA_MAX, 1);
 #endif

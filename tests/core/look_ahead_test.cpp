@@ -1,6 +1,7 @@
 // Who stands through the first window and leaves is foreground in the frames that still wait then.
 #include "core/learn/robust/look_ahead.h"
 
+#include <climits>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -44,8 +45,9 @@ Clip bag(
 
 // Of each frame.
 struct Left {
-  std::vector<double> white;  // the share of the bag's middle that is foreground
-  std::vector<double> red;    // the background there, mean
+  std::vector<double> white;    // the share of the bag's middle that is foreground
+  std::vector<double> red;      // the background there, mean
+  std::vector<int> foreground;  // pixels of the whole mask
 };
 
 class LookAheadTest : public testing::TestWithParam<bool> {
@@ -56,7 +58,8 @@ class LookAheadTest : public testing::TestWithParam<bool> {
     if (GetParam()) options.frame_rate = 1e4;
     return options;
   }
-  static Left run(const Clip& clip, const EngineOptions& options, int64_t absorb_frames = 0) {
+  static Left run(const Clip& clip, const EngineOptions& options, int64_t absorb_frames = 0,
+                  int freeze_at = INT_MAX) {
     Left left;
     Engine engine;
     EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
@@ -74,13 +77,17 @@ class LookAheadTest : public testing::TestWithParam<bool> {
             sum += background.at(0, at);
             ++pixels;
           }
+        int foreground = 0;
+        for (size_t i = 0; i < kPixels; ++i) foreground += mask.at(0, i) > 0;
+        left.foreground.push_back(foreground);
         left.white.push_back(hits / pixels);
         left.red.push_back(sum / pixels);
       }
     };
-    for (const auto& frame : clip.frames) {
+    for (size_t t = 0; t < clip.size(); ++t) {
       PackedPicture picture(kWidth, kHeight);
-      picture.fill(frame);
+      picture.fill(clip.frames[t]);
+      engine.set_freeze(static_cast<int>(t) >= freeze_at);
       EXPECT_TRUE(engine.push(picture.in()).ok());
       take();
     }
@@ -164,6 +171,54 @@ TEST_P(LookAheadTest, WindowsThatRememberNothingAreNotRevised) {
   for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
 }
 
+// People who hold a background want the one that there is.
+TEST_P(LookAheadTest, WhatIsHeldStaysAsItIs) {
+  for (int freeze_at : {0, 45, 55}) {
+    const Left left = run(bag([](int t) { return t < 60; }), options(), 0, freeze_at);
+    // A window that was begun is solved.
+    for (int t = 0; t < (freeze_at < kWindow ? kFrames : kWindow); ++t)
+      EXPECT_NEAR(left.red[static_cast<size_t>(t)], kBag, 4) << t << ", held from " << freeze_at;
+  }
+}
+
+// The place was seen, and somebody is in front of it when the background comes into use.
+TEST_P(LookAheadTest, TakesNoPasserByForWhatWasHidden) {
+  EngineOptions options = this->options();
+  options.window_size = 100;
+  for (int until : {120, 124, 128}) {
+    Clip clip = bag([](int t) { return t < 100; });
+    for (int t = 115; t < until; ++t)
+      for (size_t i = 0; i < kPixels; ++i)
+        if (in_bag(static_cast<int>(i) % kWidth, static_cast<int>(i) / kWidth))
+          clip.frames[static_cast<size_t>(t)][i] = 230;
+    const Left left = run(clip, options);
+    for (int t = until + 10 - 99; t < 100; ++t)
+      EXPECT_NEAR(left.red[static_cast<size_t>(t)], kFloor, 3) << t << ", until " << until;
+  }
+}
+
+// Most of what differs then is no place that somebody has left.
+TEST_P(LookAheadTest, ACameraThatWasMovedChangesNoFramesBefore) {
+  for (unsigned seed : {6u, 7u}) {
+    constexpr size_t kShift = 9;
+    Clip clip(kPixels, kFrames);
+    std::mt19937 rng(seed);
+    std::normal_distribution<double> noise(0, 1);
+    std::vector<int> block(3 * 20 * 20);
+    for (int& level : block) level = 60 + static_cast<int>(rng() % 120);
+    for (int t = 0; t < kFrames; ++t)
+      for (size_t i = 0; i < 3 * kPixels; ++i) {
+        const auto x = i % kWidth + (t < 60 ? 0 : kShift), y = i % kPixels / kWidth;
+        const double level = block[i / kPixels * 400 + y / 12 * 20 + x / 16];
+        clip.frames[static_cast<size_t>(t)][i] =
+            static_cast<uint8_t>(std::lround(level + noise(rng)));
+      }
+    const Left left = run(clip, options());
+    for (int t = 0; t < kWindow; ++t)
+      EXPECT_LT(left.foreground[static_cast<size_t>(t)], 20) << t << ", seed " << seed;
+  }
+}
+
 TEST_P(LookAheadTest, IsTheSameForAnyNumberOfThreads) {
   EngineOptions one = options(), three = options();
   one.threads = 1, three.threads = 3;
@@ -186,6 +241,12 @@ TEST(LookAhead, AsksThatItStoodThere) {
     if (is_in(cell)) with[cell] = 180;
   const float* const background[3] = {with.data(), with.data(), with.data()};
   const float* const frame[3] = {without.data(), without.data(), without.data()};
+  GridFrames frames(grid, 2);
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t cell = 0; cell < grid.cells(); ++cell) {
+      frames.plane(0, c)[cell] = 100;
+      frames.plane(1, c)[cell] = static_cast<int>(cell) % grid.cols < 10 ? 30 : 100;
+    }
   constexpr int kSeen = 50;
   for (int shown : {50, 25, 21, 19, 10, 0}) {
     StableFrames stable{FrameLists(grid.cells(), kSeen), {}};
@@ -194,7 +255,12 @@ TEST(LookAhead, AsksThatItStoodThere) {
     LookAhead ahead(grid);
     ahead.publish(true, stable, kSeen);
     for (int t = 0; t < StandingLooks::kSteady; ++t) ahead.follow(frame, kSameLight, t);
-    EXPECT_EQ(ahead.uncovered(background).size(), shown >= 20 ? 36u : 0u) << shown;
+    EXPECT_EQ(ahead.uncovered(background, frames, {0}, kSameLight).size(), shown >= 20 ? 36u : 0u)
+        << shown;
+    // Somebody is before two columns of it.
+    EXPECT_EQ(ahead.uncovered(background, frames, {0, 1}, kSameLight).size(),
+              shown >= 20 ? 24u : 0u)
+        << shown;
     // Later windows are not looked at, until the next stream.
     ahead.publish(false, stable, kSeen);
     EXPECT_FALSE(ahead.follows());

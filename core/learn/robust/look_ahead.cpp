@@ -1,6 +1,7 @@
 #include "core/learn/robust/look_ahead.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace qdmd {
 namespace {
@@ -26,12 +27,27 @@ void LookAhead::publish(bool first, const StableFrames& stable, int frames) {
                                           static_cast<size_t>(std::max(frames, 1)));
 }
 
-const std::vector<int>& LookAhead::uncovered(const float* const background[3]) {
-  return looks_.uncovered(background, [this](const std::vector<int>& region) {
+std::vector<int> LookAhead::uncovered(const float* const background[3], const GridFrames& frames,
+                                      const std::vector<int>& slots, const Gain& gain) {
+  const auto stood = [this](const std::vector<int>& region) {
     size_t sum = 0;
     for (int cell : region) sum += percent_[static_cast<size_t>(cell)];
     return sum >= kStood * region.size();
-  });
+  };
+  std::vector<int> cells = looks_.uncovered(background, stood);
+  // A camera that was moved makes other looks everywhere, some of which happen to fit.
+  if (2 * cells.size() < looks_.differing()) return {};
+  const auto hidden = [&](int cell) {
+    return std::any_of(slots.begin(), slots.end(), [&](int slot) {
+      float apart = 0;
+      for (int c = 0; c < kChannels; ++c)
+        apart += std::abs(frames.plane(slot, c)[cell] / gain[static_cast<size_t>(c)] -
+                          looks_.level(cell, c));
+      return apart >= StandingLooks::kSame;
+    });
+  };
+  std::erase_if(cells, hidden);
+  return cells;
 }
 
 }  // namespace qdmd

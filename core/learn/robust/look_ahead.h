@@ -32,8 +32,10 @@ class LookAhead {
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
     looks_.follow(frame, gain, number);
   }
-  // Cells that show now what is behind the background in use. Good until the next call.
-  const std::vector<int>& uncovered(const float* const background[3]);
+  // Cells that show now what is behind the background in use, and nothing else in all of the newest
+  // frames, whose cells are in these slots of `frames`, levels as they came in the light `gain`.
+  std::vector<int> uncovered(const float* const background[3], const GridFrames& frames,
+                             const std::vector<int>& slots, const Gain& gain);
   const StandingLooks& looks() const { return looks_; }
 
  private:

@@ -33,8 +33,7 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
 }
 
 void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
-  // Windows that know nothing of each other are given nothing of each other.
-  if (parameters_.earlier_share <= 0 || !ahead_.follows()) return;
+  if (!looks_ahead(room_.models) || !ahead_.follows()) return;
   const int slot = frame.around.slot(frame.at);
   const GridFrames& cells = room_.frames->cells();
   const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
@@ -46,7 +45,9 @@ void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  mend(ahead_.uncovered(background), ahead_.looks(), frame, light, model);
+  std::vector<int> slots(static_cast<size_t>(frame.around.size()));
+  for (size_t i = 0; i < slots.size(); ++i) slots[i] = frame.around.slot(static_cast<int>(i));
+  mend(ahead_.uncovered(background, cells, slots, light), ahead_.looks(), frame, light, model);
 }
 
 void RobustLearner::mend(const std::vector<int>& cells, const StandingLooks& looks,

@@ -128,8 +128,9 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       WindowMask::bytes(snapshots, pixels()) +
       PlaneSlots::bytes(snapshots, samples_at(finest_step_)) +
       SlidingGram::bytes(snapshots, threads) + FrameMemory::bytes(remembered, shape(), grid_) +
-      StandingLooks::bytes(grid_) + LookAhead::bytes(grid_) + 2 * Absorbed::bytes(grid_.cells()) +
-      SceneWatch::bytes(grid_) + static_cast<uint64_t>(window_size) * sizeof(Gain);
+      StandingLooks::bytes(grid_) + (looks_ahead(models) ? LookAhead::bytes(grid_) : 0) +
+      2 * Absorbed::bytes(grid_.cells()) + SceneWatch::bytes(grid_) +
+      static_cast<uint64_t>(window_size) * sizeof(Gain);
   // A scene that was left: levels and limits, and the same once more for windows to come. Where it
   // is back, there are two for a moment.
   const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
@@ -177,7 +178,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   light_scratch_ = LightScratch(grid_.cells());
   earlier_ = EarlierWindow(grid_);
   looks_ = StandingLooks(grid_);
-  ahead_ = LookAhead(grid_);
+  if (looks_ahead(room.models)) ahead_ = LookAhead(grid_);
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
   stable_room_ = StableFramesRoom(grid_, most_looks(room.window_size, room.models));

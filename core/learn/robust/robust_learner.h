@@ -111,6 +111,10 @@ class RobustLearner : public Learner {
   size_t samples_at(int step) const;
   SampledRows sampled_rows() const;
   int remembered_frames(int window_size) const;
+  // Windows that know nothing of each other are given nothing of each other.
+  bool looks_ahead(Models models) const {
+    return models != Models::two_of_live && parameters_.earlier_share > 0;
+  }
   uint64_t most_looks(int window_size, Models models) const;
   // Of the first snapshot, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }

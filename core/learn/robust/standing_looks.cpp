@@ -7,9 +7,7 @@
 namespace qdmd {
 namespace {
 
-// A cell shows the same as long as it is within so many levels, sum of the channels: noise of
-// cells' means is far below.
-constexpr float kSame = 12;
+constexpr float kSame = StandingLooks::kSame;
 // What a frame counts in a look, at least.
 constexpr float kShare = 0.1f;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
@@ -143,17 +141,16 @@ void StandingLooks::take_next(size_t at) {
 const std::vector<int>& StandingLooks::uncovered(const float* const background[3],
                                                  const Counts& counts) {
   found_.clear();
-  news_ = 0;
+  news_ = differing_ = 0;
   if (std::min(grid_.rows, grid_.cols) < 4) return found_;
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
-  size_t count = 0;
   for (size_t cell = 0; cell < grid_.cells(); ++cell) {
     differs_[cell] = differs_at(look, background, cell) && shows(cell);
-    count += differs_[cell];
+    differing_ += differs_[cell];
     news_ += differs_[cell] && number_ - cells_[cell].look.since < kNewsFrames;
   }
-  if (count < kLeastRegion) return found_;
+  if (differing_ < kLeastRegion) return found_;
   CellRegions regions(grid_);
   const auto& found = regions.find(differs_);
   for (size_t region = 0; region < found.size(); ++region)

@@ -15,6 +15,9 @@ namespace qdmd {
 class StandingLooks {
  public:
   static constexpr int kSteady = 10;
+  // A cell shows the same as long as it is within so many levels, sum of the channels: noise of
+  // cells' means is far below.
+  static constexpr float kSame = 12;
 
   StandingLooks() = default;
   // Takes all memory.
@@ -38,6 +41,8 @@ class StandingLooks {
   using Counts = std::function<bool(const std::vector<int>& region)>;
   const std::vector<int>& uncovered(const float* const background[3],
                                     const Counts& counts = nullptr);
+  // Cells whose look was not the background's in the last uncovered().
+  size_t differing() const { return differing_; }
   // True where uncovered() saw enough cells whose look is not the background's and has come within
   // the last kNewsFrames frames, be it uncovered or something that stops.
   bool any_news() const { return news_ >= kLeastNews; }
@@ -71,7 +76,7 @@ class StandingLooks {
   int64_t number_ = 0, previous_ = 0;  // of the newest frame, and of the one before
   std::vector<uint8_t> differs_;
   std::vector<int> found_;
-  size_t news_ = 0;
+  size_t news_ = 0, differing_ = 0;
 };
 
 }  // namespace qdmd
