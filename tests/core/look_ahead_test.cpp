@@ -1,6 +1,7 @@
 // Who stands through the first window and leaves is foreground in the frames that still wait then.
 #include "core/learn/robust/look_ahead.h"
 
+#include <array>
 #include <climits>
 #include <cmath>
 #include <functional>
@@ -255,10 +256,11 @@ TEST(LookAhead, AsksThatItStoodThere) {
     LookAhead ahead(grid);
     ahead.publish(true, stable, kSeen);
     for (int t = 0; t < StandingLooks::kSteady; ++t) ahead.follow(frame, kSameLight, t);
-    EXPECT_EQ(ahead.uncovered(background, frames, {0}, kSameLight).size(), shown >= 20 ? 36u : 0u)
+    EXPECT_EQ(ahead.uncovered(background, frames, std::array{0}, kSameLight).size(),
+              shown >= 20 ? 36u : 0u)
         << shown;
     // Somebody is before two columns of it.
-    EXPECT_EQ(ahead.uncovered(background, frames, {0, 1}, kSameLight).size(),
+    EXPECT_EQ(ahead.uncovered(background, frames, std::array{0, 1}, kSameLight).size(),
               shown >= 20 ? 24u : 0u)
         << shown;
     // Later windows are not looked at, until the next stream.

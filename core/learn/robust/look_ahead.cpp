@@ -28,7 +28,7 @@ void LookAhead::publish(bool first, const StableFrames& stable, int frames) {
 }
 
 std::vector<int> LookAhead::uncovered(const float* const background[3], const GridFrames& frames,
-                                      const std::vector<int>& slots, const Gain& gain) {
+                                      std::span<const int> slots, const Gain& gain) {
   const auto stood = [this](const std::vector<int>& region) {
     size_t sum = 0;
     for (int cell : region) sum += percent_[static_cast<size_t>(cell)];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/learn/robust/stable_frames.h"
@@ -35,7 +36,7 @@ class LookAhead {
   // Cells that show now what is behind the background in use, and nothing else in all of the newest
   // frames, whose cells are in these slots of `frames`, levels as they came in the light `gain`.
   std::vector<int> uncovered(const float* const background[3], const GridFrames& frames,
-                             const std::vector<int>& slots, const Gain& gain);
+                             std::span<const int> slots, const Gain& gain);
   const StandingLooks& looks() const { return looks_; }
 
  private:

@@ -1,5 +1,6 @@
 // What frames put in place of a background's cells between two solves.
 #include <algorithm>
+#include <array>
 
 #include "core/learn/robust/robust_learner.h"
 #include "core/passes/median_block.h"
@@ -45,9 +46,12 @@ void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  std::vector<int> slots(static_cast<size_t>(frame.around.size()));
-  for (size_t i = 0; i < slots.size(); ++i) slots[i] = frame.around.slot(static_cast<int>(i));
-  mend(ahead_.uncovered(background, cells, slots, light), ahead_.looks(), frame, light, model);
+  // Nothing is allocated where nothing was uncovered.
+  std::array<int, kMendingFrames> slots;
+  const auto count = static_cast<size_t>(frame.around.size());
+  for (size_t i = 0; i < count; ++i) slots[i] = frame.around.slot(static_cast<int>(i));
+  mend(ahead_.uncovered(background, cells, {slots.data(), count}, light), ahead_.looks(), frame,
+       light, model);
 }
 
 void RobustLearner::mend(const std::vector<int>& cells, const StandingLooks& looks,
