@@ -36,7 +36,7 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
              collection_->not_added >= std::min(kGroup, window_size_)) {
     add_group();
   }
-  if (queue->pending == window_size_ + late_frames_) {
+  if (queue->pending >= window_size_ + late_frames_) {
     queue->ready = 1;
     if (next_to_leave(*queue) == shown_.end) advance();
   }

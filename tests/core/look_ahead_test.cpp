@@ -229,7 +229,7 @@ TEST_P(LookAheadTest, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(a.red, b.red);
 }
 
-// A region of 6 x 6 cells, which all but the last frames of the window show, or some.
+// A region of 6 x 6 cells, which all frames of the window show, or some.
 TEST(LookAhead, AsksThatItStoodThere) {
   const Grid grid(240, 240, 24);
   ASSERT_EQ(grid.cells(), size_t{24} * 24);
