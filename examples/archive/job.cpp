@@ -184,7 +184,11 @@ class Job {
     done_.ended = true;
     if (read < done_.frames)
       throw std::runtime_error("the recording has fewer frames than were finished already");
-    if (writes()) write_progress(progress_path_, done_);
+    if (!writes()) return;
+    const auto end = Clock::now();
+    if (outputs_) outputs_->wait();
+    encoding_ += since(end);
+    write_progress(progress_path_, done_);
   }
 
   void check(const Status& status) const {
@@ -207,10 +211,8 @@ class Job {
       ++done_.windows;
       done_.frames = read;
       const auto end = Clock::now();
-      if (writes()) {
-        outputs_->end_window(done_.windows - 1);
-        write_progress(progress_path_, done_);
-      }
+      if (writes())
+        outputs_->end_window([path = progress_path_, done = done_] { write_progress(path, done); });
       encoding_ += since(end);
       note_solve();
     }

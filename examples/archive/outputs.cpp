@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "examples/archive/files.h"
 
@@ -72,8 +73,10 @@ std::string Outputs::part_of(size_t which, int64_t window) const {
   return (fs::path(folder_of(wanted_[which].path)) / name).string();
 }
 
-VideoShape Outputs::shape_of(size_t which) const {
-  return {width_, height_, rate_, wanted_[which].output == Output::mask};
+Outputs::Open Outputs::open(size_t which, const std::string& path,
+                            const std::string& encoder) const {
+  const VideoShape shape = {width_, height_, rate_, wanted_[which].output == Output::mask};
+  return {path, std::make_unique<VideoWriter>(temporary_of(path), shape, encoder)};
 }
 
 void Outputs::begin_after(int64_t windows) {
@@ -102,28 +105,34 @@ void Outputs::begin_after(int64_t windows) {
 
 void Outputs::write(size_t which, int64_t window, std::span<const uint8_t> frame,
                     GstClockTime time) {
-  std::unique_ptr<VideoWriter>& writer = writers_[which];
-  if (!writer)
-    writer = std::make_unique<VideoWriter>(temporary_of(part_of(which, window)), shape_of(which),
-                                           encoder_);
-  writer->write(frame, time);
+  auto file = files_.find(which);
+  if (file == files_.end())
+    file = files_.emplace(which, open(which, part_of(which, window), encoder_)).first;
+  file->second.writer->write(frame, time);
 }
 
 void Outputs::write_picture(size_t which, int64_t window, std::span<const uint8_t> frame) {
-  const std::string path = picture_of(wanted_[which].path, window);
-  VideoWriter writer(temporary_of(path), shape_of(which), kPicture);
-  writer.write(frame, 0);
-  writer.end();
-  give_name(path);
+  wait();
+  Open file = open(which, picture_of(wanted_[which].path, window), kPicture);
+  file.writer->write(frame, 0);
+  files_.emplace(which, std::move(file));
 }
 
-void Outputs::end_window(int64_t window) {
-  for (auto& [which, writer] : writers_) {
-    writer->end();
-    writer.reset();
-    give_name(part_of(which, window));
-  }
-  writers_.clear();
+void Outputs::end_window(std::function<void()> after) {
+  wait();
+  ending_ = std::async(std::launch::async,
+                       [files = std::exchange(files_, {}), after = std::move(after)]() mutable {
+                         for (auto& [which, file] : files) {
+                           file.writer->end();
+                           file.writer.reset();
+                           give_name(file.path);
+                         }
+                         after();
+                       });
+}
+
+void Outputs::wait() {
+  if (ending_.valid()) ending_.get();
 }
 
 void Outputs::join(int64_t windows) {

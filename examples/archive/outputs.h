@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <string>
@@ -34,24 +36,35 @@ class Outputs {
   void begin_after(int64_t windows);
   // One frame of video `which` of the wanted ones, in window `window`, the first being 0.
   void write(size_t which, int64_t window, std::span<const uint8_t> frame, GstClockTime time);
-  // The background of a window.
+  // The background of a window. Waits for the window before it, as end_window() does.
   void write_picture(size_t which, int64_t window, std::span<const uint8_t> frame);
-  // The window's files have their names.
-  void end_window(int64_t window);
+  // All of the window was given. While the caller goes on, its files get their names, and then
+  // `after` is called, which may throw: the other processes need not wait until a picture is
+  // encoded and on the disk. One window at a time: waits for the one before it.
+  void end_window(std::function<void()> after);
+  // All windows that were given have their names. Throws what went wrong there.
+  void wait();
   // Videos of so many windows become one each.
   void join(int64_t windows);
   // What was only there to be joined.
   void remove_parts();
 
  private:
+  // A file that is being written, under the name that it gets.
+  struct Open {
+    std::string path;
+    std::unique_ptr<VideoWriter> writer;
+  };
+
   std::string part_of(size_t which, int64_t window) const;
-  VideoShape shape_of(size_t which) const;
+  Open open(size_t which, const std::string& path, const std::string& encoder) const;
 
   std::vector<Wanted> wanted_;
   int width_, height_;
   double rate_;
   std::string encoder_;
-  std::map<size_t, std::unique_ptr<VideoWriter>> writers_;
+  std::map<size_t, Open> files_;
+  std::future<void> ending_;
 };
 
 }  // namespace qdmd::archive
