@@ -16,24 +16,31 @@ constexpr uint64_t kSliceBytes = uint64_t{32} << 20;
 // lighter but want more frames.
 constexpr int kMostBuildSlices = 8;
 
-// Frames that a solve in one piece may take: about a second, and the frames that it keeps in
-// memory.
-constexpr int kLongestPiece = 24;
+// Frames that a solve in one piece goes on for. Small frames have less work to share out, and a
+// background that comes sooner is a better one: one frame for so many pixels, but not so few that
+// one of them takes long. At most about a second, and the frames that it keeps in memory.
+constexpr uint64_t kPixelsOfPiece = 1 << 14;
+constexpr uint64_t kShortestPiece = 4, kLongestPiece = 24;
 
 int ceil_divide(int64_t value, int64_t by) { return static_cast<int>((value + by - 1) / by); }
 
 }  // namespace
 
-LivePlan::LivePlan(int window_size, int hop_size, uint64_t frame_bytes, bool in_one_piece)
+int LivePlan::piece_frames(uint64_t pixels) {
+  return static_cast<int>(
+      std::clamp((pixels + kPixelsOfPiece - 1) / kPixelsOfPiece, kShortestPiece, kLongestPiece));
+}
+
+LivePlan::LivePlan(int window_size, int hop_size, uint64_t frame_bytes, int piece_frames)
     : window_size_(window_size),
       hop_size_(std::clamp(hop_size > 0 ? hop_size : window_size / 4, 1, window_size)),
       frame_bytes_(frame_bytes),
-      in_one_piece_(in_one_piece) {
+      piece_frames_(piece_frames) {
   restart(1);
 }
 
 int LivePlan::slices(int64_t snapshots) const {
-  if (in_one_piece_) return 1;
+  if (in_one_piece()) return 1;
   const uint64_t bytes = frame_bytes_ * static_cast<uint64_t>(snapshots);
   return static_cast<int>(
       std::clamp<uint64_t>((bytes + kSliceBytes - 1) / kSliceBytes, 1, kMostGroup));
@@ -45,7 +52,7 @@ int LivePlan::largest_group() const {
 
 int LivePlan::most_late_frames() const {
   if (at_once()) return 0;
-  if (in_one_piece_) return std::min(kLongestPiece, hop_size_) - 1;
+  if (in_one_piece()) return std::min(piece_frames_, hop_size_) - 1;
   return std::min(most_slices(), largest_group()) - 1 +
          std::min({most_slices(), kMostBuildSlices, hop_size_});
 }
@@ -82,7 +89,7 @@ LivePlan::Step LivePlan::next() {
   // A hop of the warm-up may be a larger group, but there are no frames to spare for it.
   step.gram_slices = std::min({slices(size), until_next, largest_group()});
   if (step.solve) {
-    const int most = in_one_piece_ ? kLongestPiece : std::min(slices(size), kMostBuildSlices);
+    const int most = in_one_piece() ? piece_frames_ : std::min(slices(size), kMostBuildSlices);
     step.build_slices = std::min(most, static_cast<int>(solve_at_ - start_));
   }
   return step;

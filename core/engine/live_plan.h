@@ -21,9 +21,11 @@ class LivePlan {
   };
 
   LivePlan() = default;
-  // frame_bytes: of one frame in the window. in_one_piece: a solve is one piece of work beside the
-  // frames, not sliced, which has until `build_slices` frames later.
-  LivePlan(int window_size, int hop_size, uint64_t frame_bytes, bool in_one_piece = false);
+  // frame_bytes: of one frame in the window. piece_frames: not 0 where a solve is one piece of work
+  // beside the frames, not sliced, which has until `build_slices` frames later, at most so many.
+  LivePlan(int window_size, int hop_size, uint64_t frame_bytes, int piece_frames = 0);
+  // For frames of so many pixels.
+  static int piece_frames(uint64_t pixels);
 
   // The next frame is the first of a new window, whose first solve comes with frame `first_solve`.
   void restart(int first_solve);
@@ -35,8 +37,8 @@ class LivePlan {
   int window_size() const { return window_size_; }
 
   // True where a solve is so small that it is done at once, with its last frame.
-  bool at_once() const { return !in_one_piece_ && most_slices() == 1; }
-  bool in_one_piece() const { return in_one_piece_; }
+  bool at_once() const { return !in_one_piece() && most_slices() == 1; }
+  bool in_one_piece() const { return piece_frames_ > 0; }
   // Frames that arrive while the snapshots of a solve are still needed.
   int most_late_frames() const;
 
@@ -49,7 +51,7 @@ class LivePlan {
 
   int window_size_ = 2, hop_size_ = 1;
   uint64_t frame_bytes_ = 0;
-  bool in_one_piece_ = false;
+  int piece_frames_ = 0;
   int64_t frames_ = 0;
   // The hop that runs: (start_, solve_at_], in `groups_` groups, of which `groups_done_` are over.
   int64_t start_ = 0, solve_at_ = 1;

@@ -216,6 +216,26 @@ TEST(LivePlan, WhatIsSmallIsDoneAtOnce) {
   });
 }
 
+TEST(LivePlan, ASolveInOnePieceIsDueSoonerWhereFramesAreSmall) {
+  EXPECT_EQ(LivePlan::piece_frames(1), 4);
+  EXPECT_EQ(LivePlan::piece_frames(320 * 240), 5);
+  EXPECT_EQ(LivePlan::piece_frames(640 * 480), 19);
+  EXPECT_EQ(LivePlan::piece_frames(768 * 576), 24);
+  EXPECT_EQ(LivePlan::piece_frames(uint64_t{1} << 36), 24);
+  for (int frames : {4, 19, 24, 60}) {
+    LivePlan plan(100, 25, 64, frames);
+    EXPECT_TRUE(plan.in_one_piece());
+    EXPECT_EQ(plan.most_late_frames(), std::min(frames, 25) - 1);
+    plan.restart(1);
+    for (int frame = 1; frame <= 500; ++frame) {
+      const LivePlan::Step step = plan.next();
+      if (step.solve && frame > 100) {
+        ASSERT_EQ(step.build_slices, std::min(frames, 25));
+      }
+    }
+  }
+}
+
 TEST(LivePlan, NoFrameReadsMuchMoreThanItsShare) {
   for_every_setting([](const Setting& setting) {
     LivePlan schedule = schedule_of(setting);

@@ -182,6 +182,33 @@ TEST_P(StandingLooksOf, WhatHasStoodIsFoundWhereEachCellSaysSo) {
   EXPECT_TRUE(looks.stood(planes_of(known).data(), 50).empty());
 }
 
+// Cells that are hidden in 0, 1, 2, 3, 0, ... of five frames, each of which has its own light.
+TEST_P(StandingLooksOf, WhatIsHiddenInMoreThanOneFrameIsLeftOut) {
+  const auto [width, height] = GetParam();
+  const Grid grid(width, height);
+  StandingLooks looks(grid);
+  const std::vector<float> level(grid.cells(), 100);
+  const float* const frame[3] = {level.data(), level.data(), level.data()};
+  for (int t = 0; t < StandingLooks::kSteady; ++t) looks.follow(frame, kSameLight, t);
+  constexpr int kFrames = 5;
+  GridFrames frames(grid, kFrames);
+  std::array<LitSlot, kFrames> slots;
+  for (int i = 0; i < kFrames; ++i) {
+    const float light = 1 - 0.1f * static_cast<float>(i);
+    slots[static_cast<size_t>(i)] = {kFrames - 1 - i, {light, light, light}};
+    for (int c = 0; c < kChannels; ++c)
+      for (int cell = 0; cell < static_cast<int>(grid.cells()); ++cell)
+        frames.plane(kFrames - 1 - i, c)[cell] = light * (i < cell % 4 && c == 1 ? 113.f : 100.f);
+  }
+  std::vector<int> cells, expected;
+  for (int cell = 0; cell < static_cast<int>(grid.cells()); cell += 3) {
+    cells.push_back(cell);
+    if (cell % 4 < 2) expected.push_back(cell);
+  }
+  looks.leave_out_hidden(frames, slots, &cells);
+  EXPECT_EQ(cells, expected);
+}
+
 INSTANTIATE_TEST_SUITE_P(Grids, StandingLooksOf,
                          testing::Values(std::array{320, 240}, std::array{48, 48}, std::array{7, 5},
                                          std::array{353, 131}));

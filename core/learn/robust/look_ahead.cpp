@@ -1,7 +1,6 @@
 #include "core/learn/robust/look_ahead.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace qdmd {
 namespace {
@@ -27,27 +26,16 @@ void LookAhead::publish(bool first, const StableFrames& stable, int frames) {
                                           static_cast<size_t>(std::max(frames, 1)));
 }
 
-std::vector<int> LookAhead::uncovered(const float* const background[3], const GridFrames& frames,
-                                      std::span<const int> slots, const Gain& gain) {
+const std::vector<int>& LookAhead::uncovered(const float* const background[3]) {
   const auto stood = [this](const std::vector<int>& region) {
     size_t sum = 0;
     for (int cell : region) sum += percent_[static_cast<size_t>(cell)];
     return sum >= kStood * region.size();
   };
-  std::vector<int> cells = looks_.uncovered(background, stood);
+  const std::vector<int>& cells = looks_.uncovered(background, stood);
   // A camera that was moved makes other looks everywhere, some of which happen to fit.
-  if (2 * cells.size() < looks_.differing()) return {};
-  const auto hidden = [&](int cell) {
-    return std::any_of(slots.begin(), slots.end(), [&](int slot) {
-      float apart = 0;
-      for (int c = 0; c < kChannels; ++c)
-        apart += std::abs(frames.plane(slot, c)[cell] / gain[static_cast<size_t>(c)] -
-                          looks_.level(cell, c));
-      return apart >= StandingLooks::kSame;
-    });
-  };
-  std::erase_if(cells, hidden);
-  return cells;
+  static const std::vector<int> none;
+  return 2 * cells.size() < looks_.differing() ? none : cells;
 }
 
 }  // namespace qdmd

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/learn/robust/stable_frames.h"
@@ -33,10 +32,8 @@ class LookAhead {
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
     looks_.follow(frame, gain, number);
   }
-  // Cells that show now what is behind the background in use, and nothing else in all of the newest
-  // frames, whose cells are in these slots of `frames`, levels as they came in the light `gain`.
-  std::vector<int> uncovered(const float* const background[3], const GridFrames& frames,
-                             std::span<const int> slots, const Gain& gain);
+  // Cells that show now what is behind the background in use. Good until the next call.
+  const std::vector<int>& uncovered(const float* const background[3]);
   const StandingLooks& looks() const { return looks_; }
 
  private:

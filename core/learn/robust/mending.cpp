@@ -1,6 +1,6 @@
 // What frames put in place of a background's cells between two solves.
 #include <algorithm>
-#include <array>
+#include <utility>
 
 #include "core/learn/robust/robust_learner.h"
 #include "core/passes/median_block.h"
@@ -25,12 +25,12 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
     std::vector<int> uncovered = looks_.uncovered(background);
     if (looks_.any_news()) calm_ = 0;
     if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
-    mend(uncovered, looks_, frame, light, model);
+    mend_uncovered(std::move(uncovered), looks_, frame, light, model);
   }
   if (absorb_frames_ == 0) return;
   const std::vector<int>& stood = looks_.stood(background, absorb_frames_);
   for (int cell : stood) absorbed_.add(cell, looks_.since(cell));
-  mend(stood, looks_, frame, light, model);
+  mend(stood, looks_, frame, lit_frames(frame, light), model);
 }
 
 void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
@@ -46,27 +46,42 @@ void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  // Nothing is allocated where nothing was uncovered.
-  std::array<int, kMendingFrames> slots;
-  const auto count = static_cast<size_t>(frame.around.size());
-  for (size_t i = 0; i < count; ++i) slots[i] = frame.around.slot(static_cast<int>(i));
-  mend(ahead_.uncovered(background, cells, {slots.data(), count}, light), ahead_.looks(), frame,
-       light, model);
+  mend_uncovered(ahead_.uncovered(background), ahead_.looks(), frame, light, model);
+}
+
+RobustLearner::LitFrames RobustLearner::lit_frames(const Compared& frame, const Gain& light) {
+  LitFrames lit = {frame.around.every(2), {}};
+  for (int i = 0; i < lit.frames.size(); ++i) {
+    const int slot = lit.frames.slot(i);
+    lit.at[static_cast<size_t>(i)] = {
+        slot, slot == frame.around.slot(frame.at) ? light : this->light(slot)};
+  }
+  return lit;
+}
+
+void RobustLearner::mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
+                                   const Compared& frame, const Gain& light,
+                                   BackgroundModel* model) {
+  // Nothing is computed where nothing was uncovered.
+  if (cells.empty()) return;
+  const LitFrames lit = lit_frames(frame, light);
+  looks.leave_out_hidden(room_.frames->cells(), lit.slots(), &cells);
+  mend(cells, looks, frame, lit, model);
 }
 
 void RobustLearner::mend(const std::vector<int>& cells, const StandingLooks& looks,
-                         const Compared& frame, const Gain& light, BackgroundModel* model) {
+                         const Compared& frame, const LitFrames& lit, BackgroundModel* model) {
   if (cells.empty()) return;
   calm_ = 0;
   model->freeze_but_for_light(frame.t);
-  replace(cells, looks, frame.around.every(2), light, model);
-  if (options_.low_bits() > 0)
-    replace_deep(cells, room_.frames->whole(frame.around.every(2)), light, model);
+  replace(cells, looks, lit, model);
+  if (options_.low_bits() > 0) replace_deep(cells, lit, model);
 }
 
 // The same of whole samples.
-void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRange& frames,
-                                 const Gain& light, BackgroundModel* model) const {
+void RobustLearner::replace_deep(const std::vector<int>& cells, const LitFrames& lit,
+                                 BackgroundModel* model) const {
+  const SnapshotRange frames = room_.frames->whole(lit.frames);
   const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
   const double unit = 1.0 / (1 << frames.low_bits());
   const auto sample_of = [&](int t, int c, size_t pixel) {
@@ -85,14 +100,15 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
           // In order: there are a few.
           double samples[kMendingFrames];
           for (int t = 0; t < frames.size(); ++t) {
-            const double sample = sample_of(t, c, p);
+            const Gain& light = lit.at[static_cast<size_t>(t)].light;
+            const double sample =
+                sample_of(t, c, p) / static_cast<double>(light[static_cast<size_t>(c)]);
             int at = t;
             for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
             samples[at] = sample;
           }
           const double middle = (samples[(count - 1) / 2] + samples[half]) / 2;
-          const auto channel = static_cast<size_t>(c);
-          level[channel] = static_cast<float>(middle * unit / static_cast<double>(light[channel]));
+          level[c] = static_cast<float>(middle * unit);
         }
         const float* const out[3] = {&level[0], &level[1], &level[2]};
         model->replace(p, 1, out);
@@ -102,12 +118,12 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const SnapshotRa
 
 // The median of the frames in place of the background of these cells.
 void RobustLearner::replace(const std::vector<int>& cells, const StandingLooks& looks,
-                            const SnapshotRange& frames, const Gain& light,
-                            BackgroundModel* model) {
+                            const LitFrames& lit, BackgroundModel* model) {
+  const SnapshotRange& frames = lit.frames;
   const auto count = static_cast<size_t>(frames.size());
   MedianFrame at[kMendingFrames] = {};  // of blocks of one row
   for (size_t i = 0; i < count; ++i)
-    for (size_t c = 0; c < kChannels; ++c) at[i].inverse[c] = 1 / light[c];
+    for (size_t c = 0; c < kChannels; ++c) at[i].inverse[c] = 1 / lit.at[i].light[c];
   const auto stride = static_cast<size_t>(grid_.width);
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;

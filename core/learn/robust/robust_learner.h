@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/dmd/decompose.h"
@@ -129,12 +131,23 @@ class RobustLearner : public Learner {
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames();
   void keep_some();
+  // Frames that cells of a background are taken from, each in its own light.
+  struct LitFrames {
+    SnapshotRange frames;
+    std::array<LitSlot, kMendingFrames> at;
+    std::span<const LitSlot> slots() const {
+      return {at.data(), static_cast<size_t>(frames.size())};
+    }
+  };
+  LitFrames lit_frames(const Compared& frame, const Gain& light);
+  void mend_uncovered(std::vector<int> cells, const StandingLooks& looks, const Compared& frame,
+                      const Gain& light, BackgroundModel* model);
   void mend(const std::vector<int>& cells, const StandingLooks& looks, const Compared& frame,
-            const Gain& light, BackgroundModel* model);
-  void replace(const std::vector<int>& cells, const StandingLooks& looks,
-               const SnapshotRange& frames, const Gain& light, BackgroundModel* model);
+            const LitFrames& lit, BackgroundModel* model);
+  void replace(const std::vector<int>& cells, const StandingLooks& looks, const LitFrames& lit,
+               BackgroundModel* model);
   bool is_calm() const;
-  void replace_deep(const std::vector<int>& cells, const SnapshotRange& frames, const Gain& light,
+  void replace_deep(const std::vector<int>& cells, const LitFrames& lit,
                     BackgroundModel* model) const;
   void end(BackgroundModel* model);
   template <typename Work>

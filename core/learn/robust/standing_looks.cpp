@@ -10,6 +10,8 @@ namespace {
 constexpr float kSame = StandingLooks::kSame;
 // What a frame counts in a look, at least.
 constexpr float kShare = 0.1f;
+// Frames that hide a cell: one may be the noise of cells of few pixels.
+constexpr int kHiding = 2;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
 // Cells that are followed together: plain loops, which the compiler makes vectors of.
 constexpr size_t kTogether = 64;
@@ -159,6 +161,20 @@ const std::vector<int>& StandingLooks::uncovered(const float* const background[3
             .is_weaker(look, background))
       found_.insert(found_.end(), found[region].begin(), found[region].end());
   return found_;
+}
+
+void StandingLooks::leave_out_hidden(const GridFrames& frames, std::span<const LitSlot> slots,
+                                     std::vector<int>* of) const {
+  std::erase_if(*of, [&](int cell) {
+    const auto hides = [&](const LitSlot& at) {
+      float apart = 0;
+      for (int c = 0; c < kChannels; ++c)
+        apart += std::abs(frames.plane(at.slot, c)[cell] / at.light[static_cast<size_t>(c)] -
+                          level(cell, c));
+      return apart >= kSame;
+    };
+    return std::count_if(slots.begin(), slots.end(), hides) >= kHiding;
+  });
 }
 
 const std::vector<int>& StandingLooks::stood(const float* const background[3], int64_t frames) {

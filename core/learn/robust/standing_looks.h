@@ -4,12 +4,19 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "core/learn/robust/contour.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
+
+// Where a frame lies, and its light.
+struct LitSlot {
+  int slot = 0;
+  Gain light = kSameLight;
+};
 
 // A cell's look is what it showed last for kSteady frames in a row.
 class StandingLooks {
@@ -41,6 +48,10 @@ class StandingLooks {
   using Counts = std::function<bool(const std::vector<int>& region)>;
   const std::vector<int>& uncovered(const float* const background[3],
                                     const Counts& counts = nullptr);
+  // Takes out of a list of cells those that show something else than their look in more than one of
+  // the frames that lie in these slots of `frames`, each in its own light: somebody passes there.
+  void leave_out_hidden(const GridFrames& frames, std::span<const LitSlot> slots,
+                        std::vector<int>* of) const;
   // Cells whose look was not the background's in the last uncovered().
   size_t differing() const { return differing_; }
   // True where uncovered() saw enough cells whose look is not the background's and has come within
