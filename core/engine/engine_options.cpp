@@ -27,8 +27,11 @@ bool has_too_many_pixels(int width, int height) {
 
 LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  return LivePlan(options.window_size, options.hop_size, PlaneSlots::bytes(1, pixels),
-                  learner.in_one_piece() ? LivePlan::piece_frames(pixels) : 0);
+  const int piece = learner.in_one_piece()
+                        ? LivePlan::piece_frames(pixels, learner.solve_seconds(options.window_size,
+                                                                               Models::two_of_live))
+                        : 0;
+  return LivePlan(options.window_size, options.hop_size, PlaneSlots::bytes(1, pixels), piece);
 }
 
 uint64_t saturating_sum(uint64_t a, uint64_t b) {

@@ -1,6 +1,7 @@
 #include "core/engine/live_plan.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace qdmd {
 namespace {
@@ -16,19 +17,22 @@ constexpr uint64_t kSliceBytes = uint64_t{32} << 20;
 // lighter but want more frames.
 constexpr int kMostBuildSlices = 8;
 
-// Frames that a solve in one piece goes on for. Small frames have less work to share out, and a
-// background that comes sooner is a better one: one frame for so many pixels, but not so few that
-// one of them takes long. At most about a second, and the frames that it keeps in memory.
+// Frames that a solve in one piece goes on for. A background that comes sooner is a better one, and
+// small frames have little work to share out: one frame for so many pixels, as long as none has
+// more than so many seconds of it. At most about a second, and the frames that it keeps in memory.
 constexpr uint64_t kPixelsOfPiece = 1 << 14;
-constexpr uint64_t kShortestPiece = 4, kLongestPiece = 24;
+constexpr double kSecondsOfFrame = 3e-3;
+constexpr int kShortestPiece = 4, kLongestPiece = 24;
 
 int ceil_divide(int64_t value, int64_t by) { return static_cast<int>((value + by - 1) / by); }
 
 }  // namespace
 
-int LivePlan::piece_frames(uint64_t pixels) {
-  return static_cast<int>(
-      std::clamp((pixels + kPixelsOfPiece - 1) / kPixelsOfPiece, kShortestPiece, kLongestPiece));
+int LivePlan::piece_frames(uint64_t pixels, double solve_seconds) {
+  const double frames = std::max(static_cast<double>(pixels) / static_cast<double>(kPixelsOfPiece),
+                                 solve_seconds / kSecondsOfFrame);
+  return std::clamp(static_cast<int>(std::ceil(std::min<double>(frames, kLongestPiece))),
+                    kShortestPiece, kLongestPiece);
 }
 
 LivePlan::LivePlan(int window_size, int hop_size, uint64_t frame_bytes, int piece_frames)

@@ -24,8 +24,8 @@ class LivePlan {
   // frame_bytes: of one frame in the window. piece_frames: not 0 where a solve is one piece of work
   // beside the frames, not sliced, which has until `build_slices` frames later, at most so many.
   LivePlan(int window_size, int hop_size, uint64_t frame_bytes, int piece_frames = 0);
-  // For frames of so many pixels.
-  static int piece_frames(uint64_t pixels);
+  // For frames of so many pixels and solves of so many seconds (Learner::solve_seconds()).
+  static int piece_frames(uint64_t pixels, double solve_seconds);
 
   // The next frame is the first of a new window, whose first solve comes with frame `first_solve`.
   void restart(int first_solve);

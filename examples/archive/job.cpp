@@ -148,7 +148,10 @@ class Job {
     for (int rank = 0; rank < band.members(); ++rank)
       ends_.push_back(row * static_cast<size_t>(band.end_of(rank)));
     outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
-    if (writes()) outputs_->begin_after(done_.windows);
+    if (!writes()) return;
+    // Nobody goes on with what another job had done.
+    if (!options_.resume) fs::remove(progress_path_);
+    outputs_->begin_after(done_.windows);
   }
 
   bool wants_masks() const {

@@ -40,8 +40,8 @@ void push(const PipelinePtr& pipeline, const ElementPtr& source, GstBuffer* buff
 
 // Slices would be threads' work: a process has one core.
 const char* const kLossless = "avenc_ffv1 ! matroskamux";
-// One process encodes, and the others wait for it: files are 4 % larger than with the encoder's own
-// level, in two thirds of its time.
+// One process encodes, beside the frames that it reads: files are 4 % larger than with the
+// encoder's own level, in two thirds of its time.
 const char* const kPicture = "pngenc snapshot=true compression-level=2";
 
 VideoWriter::VideoWriter(const std::string& path, const VideoShape& shape,

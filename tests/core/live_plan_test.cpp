@@ -217,11 +217,15 @@ TEST(LivePlan, WhatIsSmallIsDoneAtOnce) {
 }
 
 TEST(LivePlan, ASolveInOnePieceIsDueSoonerWhereFramesAreSmall) {
-  EXPECT_EQ(LivePlan::piece_frames(1), 4);
-  EXPECT_EQ(LivePlan::piece_frames(320 * 240), 5);
-  EXPECT_EQ(LivePlan::piece_frames(640 * 480), 19);
-  EXPECT_EQ(LivePlan::piece_frames(768 * 576), 24);
-  EXPECT_EQ(LivePlan::piece_frames(uint64_t{1} << 36), 24);
+  EXPECT_EQ(LivePlan::piece_frames(1, 0), 4);
+  EXPECT_EQ(LivePlan::piece_frames(320 * 240, 0.015), 5);
+  EXPECT_EQ(LivePlan::piece_frames(640 * 480, 0.015), 19);
+  EXPECT_EQ(LivePlan::piece_frames(768 * 576, 0.015), 24);
+  EXPECT_EQ(LivePlan::piece_frames(uint64_t{1} << 36, 0.015), 24);
+  // Long windows, and more iterations, are more work for each of them.
+  EXPECT_EQ(LivePlan::piece_frames(320 * 240, 0.03), 10);
+  EXPECT_EQ(LivePlan::piece_frames(320 * 240, 0.085), 24);
+  EXPECT_EQ(LivePlan::piece_frames(1, 1e9), 24);
   for (int frames : {4, 19, 24, 60}) {
     LivePlan plan(100, 25, 64, frames);
     EXPECT_TRUE(plan.in_one_piece());

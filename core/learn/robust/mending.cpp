@@ -16,6 +16,7 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
   const GridFrames& cells = room_.frames->cells();
   const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};
   const Gain light = model->light(frame.t);
+  const BackgroundModel* const of_window = frame.live ? nullptr : model;
   looks_.follow(now, light, frame.number);
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
@@ -25,12 +26,12 @@ void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
     std::vector<int> uncovered = looks_.uncovered(background);
     if (looks_.any_news()) calm_ = 0;
     if (!frame.live) std::erase_if(uncovered, [&](int cell) { return !absorbed_.has(cell); });
-    mend_uncovered(std::move(uncovered), looks_, frame, light, model);
+    mend_uncovered(std::move(uncovered), looks_, frame, light, of_window, model);
   }
   if (absorb_frames_ == 0) return;
   const std::vector<int>& stood = looks_.stood(background, absorb_frames_);
   for (int cell : stood) absorbed_.add(cell, looks_.since(cell));
-  mend(stood, looks_, frame, lit_frames(frame, light), model);
+  if (!stood.empty()) mend(stood, looks_, frame, lit_frames(frame, light, of_window), model);
 }
 
 void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
@@ -46,25 +47,31 @@ void RobustLearner::look_ahead(const Compared& frame, BackgroundModel* model) {
   const float* const background[3] = {background_cells_.plane(published_, 0),
                                       background_cells_.plane(published_, 1),
                                       background_cells_.plane(published_, 2)};
-  mend_uncovered(ahead_.uncovered(background), ahead_.looks(), frame, light, model);
+  mend_uncovered(ahead_.uncovered(background), ahead_.looks(), frame, light, nullptr, model);
 }
 
-RobustLearner::LitFrames RobustLearner::lit_frames(const Compared& frame, const Gain& light) {
-  LitFrames lit = {frame.around.every(2), {}};
+// of_window: the model whose window the frames are of, which knows their light; null: they came
+// after it.
+RobustLearner::LitFrames RobustLearner::lit_frames(const Compared& frame, const Gain& light,
+                                                   const BackgroundModel* of_window) {
+  // The frame is one of them.
+  const int from = frame.at % 2;
+  LitFrames lit = {frame.around.newest(frame.around.size() - from).every(2), {}};
   for (int i = 0; i < lit.frames.size(); ++i) {
-    const int slot = lit.frames.slot(i);
-    lit.at[static_cast<size_t>(i)] = {
-        slot, slot == frame.around.slot(frame.at) ? light : this->light(slot)};
+    const int slot = lit.frames.slot(i), later = from + 2 * i - frame.at;
+    lit.at[static_cast<size_t>(i)] = {slot, later == 0  ? light
+                                            : of_window ? of_window->light(frame.t + later)
+                                                        : this->light(slot)};
   }
   return lit;
 }
 
 void RobustLearner::mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
                                    const Compared& frame, const Gain& light,
-                                   BackgroundModel* model) {
+                                   const BackgroundModel* of_window, BackgroundModel* model) {
   // Nothing is computed where nothing was uncovered.
   if (cells.empty()) return;
-  const LitFrames lit = lit_frames(frame, light);
+  const LitFrames lit = lit_frames(frame, light, of_window);
   looks.leave_out_hidden(room_.frames->cells(), lit.slots(), &cells);
   mend(cells, looks, frame, lit, model);
 }

@@ -139,9 +139,9 @@ class RobustLearner : public Learner {
       return {at.data(), static_cast<size_t>(frames.size())};
     }
   };
-  LitFrames lit_frames(const Compared& frame, const Gain& light);
+  LitFrames lit_frames(const Compared& frame, const Gain& light, const BackgroundModel* of_window);
   void mend_uncovered(std::vector<int> cells, const StandingLooks& looks, const Compared& frame,
-                      const Gain& light, BackgroundModel* model);
+                      const Gain& light, const BackgroundModel* of_window, BackgroundModel* model);
   void mend(const std::vector<int>& cells, const StandingLooks& looks, const Compared& frame,
             const LitFrames& lit, BackgroundModel* model);
   void replace(const std::vector<int>& cells, const StandingLooks& looks, const LitFrames& lit,

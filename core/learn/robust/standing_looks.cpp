@@ -10,8 +10,8 @@ namespace {
 constexpr float kSame = StandingLooks::kSame;
 // What a frame counts in a look, at least.
 constexpr float kShare = 0.1f;
-// Frames that hide a cell: one may be the noise of cells of few pixels.
-constexpr int kHiding = 2;
+// Frames that hide a cell: one of several may be the noise of cells of few pixels.
+constexpr std::ptrdiff_t kHiding = 2;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
 // Cells that are followed together: plain loops, which the compiler makes vectors of.
 constexpr size_t kTogether = 64;
@@ -173,7 +173,8 @@ void StandingLooks::leave_out_hidden(const GridFrames& frames, std::span<const L
                           level(cell, c));
       return apart >= kSame;
     };
-    return std::count_if(slots.begin(), slots.end(), hides) >= kHiding;
+    const auto count = std::count_if(slots.begin(), slots.end(), hides);
+    return count >= kHiding || 2 * count >= std::ssize(slots);
   });
 }
 

@@ -48,8 +48,9 @@ class StandingLooks {
   using Counts = std::function<bool(const std::vector<int>& region)>;
   const std::vector<int>& uncovered(const float* const background[3],
                                     const Counts& counts = nullptr);
-  // Takes out of a list of cells those that show something else than their look in more than one of
-  // the frames that lie in these slots of `frames`, each in its own light: somebody passes there.
+  // Takes out of a list of cells those that show something else than their look in more than one,
+  // or in half, of the frames that lie in these slots of `frames`, each in its own light: somebody
+  // passes there.
   void leave_out_hidden(const GridFrames& frames, std::span<const LitSlot> slots,
                         std::vector<int>* of) const;
   // Cells whose look was not the background's in the last uncovered().
