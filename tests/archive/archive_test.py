@@ -398,10 +398,14 @@ def errors(folder):
                 ).set_state(Gst.State.NULL)
     text = run(folder, 4, folder / 'low.mkv', '--background', 'b.png', expect=1)
     assert 'start fewer' in text, text
-    # What fails while the next window is read ends the job, too.
+    # What fails while the next window is read ends the job, too. It begins anew: what another one
+    # had done is forgotten.
     (folder / 'taken.png' / 'inside').mkdir(parents=True)
+    progress = folder / 'taken.png.progress'
+    progress.write_text('{}')
     text = run(folder, 0, folder / 'low.mkv', '--background', 'taken.png', '--window', 2, expect=1)
     assert 'taken.png' in text, text
+    assert not progress.exists()
     (folder / 'taken.png' / 'inside').rmdir()
     (folder / 'taken.png').rmdir()
     assert '--window' in run(folder, 0, '--help')

@@ -54,8 +54,8 @@ constexpr Thinning thinning_of(Models models) {
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
 
 // A solve changed little if cells moved by less than a level in each channel on average, and no
-// more than a tenth of them by two. Noise and clouds stay below that; a background of
-// which parts are still hidden does not.
+// more than a tenth of them by two. Noise and clouds stay below that; a background of which parts
+// are still hidden does not.
 constexpr float kCalmMean = 3, kCalmCell = 6, kMostMoved = 0.1f;
 
 // Of frames that are one frame apart, from one of frames that are `stride` apart.
