@@ -378,10 +378,10 @@ TEST(RobustEngine, MemoryBesideTheFramesCounts) {
   EngineOptions options = robust_of(100);
   const EngineLayout layout = layout_of(options, 1920, 1080);
   EXPECT_EQ(layout.frame_bytes, uint64_t{100} * 3 * 1920 * 1080);
-  // A mask has a bit a pixel, the pictures are those of some frames, and half as many as the window
-  // has are remembered.
-  EXPECT_GT(layout.bytes, layout.frame_bytes * 3 / 2 + uint64_t{50} * 1920 * 1080 / 8);
-  EXPECT_LT(layout.bytes, layout.frame_bytes * 7 / 4);
+  // A mask has a bit a pixel, the pictures are those of some frames, and a quarter as many as the
+  // window has are remembered, of which a solve sees every second frame.
+  EXPECT_GT(layout.bytes, layout.frame_bytes * 5 / 4 + uint64_t{50} * 1920 * 1080 / 8);
+  EXPECT_LT(layout.bytes, layout.frame_bytes * 3 / 2);
   options.max_memory = layout.bytes;
   EXPECT_TRUE(check_options(options, 1920, 1080).ok());
   options.max_memory = layout.bytes - 1;

@@ -50,8 +50,13 @@ constexpr Thinning thinning_of(Models models) {
   return models == Models::two_of_live ? Thinning{33, 3} : Thinning{50, 2};
 }
 
-// One frame in so many may be remembered, for so many windows.
+// One of so many frames that a solve looks at may be remembered, for so many windows.
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
+// Of the frames that are remembered, windows that overlap still have a part: there it is one of so
+// many of all.
+int remembered_stride(Models models, int window_size) {
+  return models == Models::two_of_live ? 1 : thinning_of(models).stride_of(window_size);
+}
 
 // A solve changed little if cells moved by less than a level in each channel on average, and no
 // more than a tenth of them by two. Noise and clouds stay below that; a background of which parts
@@ -91,8 +96,9 @@ std::vector<int> RobustLearner::sample_steps() const {
   return steps;
 }
 
-int RobustLearner::remembered_frames(int window_size) const {
-  const double share = static_cast<double>(parameters_.remembered_share) * window_size;
+int RobustLearner::remembered_frames(int window_size, Models models) const {
+  const int frames = window_size / remembered_stride(models, window_size);
+  const double share = static_cast<double>(parameters_.remembered_share) * frames;
   return std::min(static_cast<int>(share), parameters_.start_frames / 2);
 }
 
@@ -109,7 +115,7 @@ SampledRows RobustLearner::sampled_rows() const {
 uint64_t RobustLearner::most_looks(int window_size, Models models) const {
   const int snapshots = thinning_of(models).most_snapshots(window_size);
   return static_cast<uint64_t>(std::min(snapshots, parameters_.start_frames) +
-                               remembered_frames(window_size) + 1);
+                               remembered_frames(window_size, models) + 1);
 }
 
 uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) const {
@@ -117,7 +123,7 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
   DmdOptions dmd = options_.dmd;
   if (models == Models::two_of_live) dmd.max_modes = BackgroundModel::most_modes(window_size);
   const int snapshots = thinning_of(models).most_snapshots(window_size),
-            remembered = remembered_frames(window_size);
+            remembered = remembered_frames(window_size, models);
   const uint64_t looks = most_looks(window_size, models);
   const auto levels = [this](uint64_t planes) { return planes * grid_.cells() * sizeof(float); };
   // The reference and what an earlier window left: levels, spread, threshold, reach.
@@ -182,7 +188,7 @@ void RobustLearner::begin(const LearnerRoom& room) {
   absorbed_ = absorbed_now_ = Absorbed(grid_.cells());
   scene_ = SceneWatch(grid_);
   stable_room_ = StableFramesRoom(grid_, most_looks(room.window_size, room.models));
-  memory_ = FrameMemory(remembered_frames(room.window_size), shape(), grid_);
+  memory_ = FrameMemory(remembered_frames(room.window_size, room.models), shape(), grid_);
   mask_ = WindowMask(snapshots, pixels());
   samples_ = Window(snapshots, samples_at(finest_step_));
   gram_ = SlidingGram(snapshots, room.pool);
@@ -548,9 +554,10 @@ std::vector<Gain> RobustLearner::gains_of_frames() {
 
 // For windows to come.
 void RobustLearner::keep_some() {
+  const int step = kRememberedStep * remembered_stride(room_.models, room_.window_size);
   for (int i = 0; i < snapshots_->size(); ++i) {
     const int64_t number = first_number() + i;
-    if ((number - stream_from_) % kRememberedStep != 0 || number <= memory_.newest()) continue;
+    if ((number - stream_from_) % step != 0 || number <= memory_.newest()) continue;
     memory_.keep(number, *snapshots_, i, room_.frames->cells(),
                  int64_t{kRememberedWindows} * room_.window_size, room_.pool);
   }

@@ -36,7 +36,8 @@ struct RobustParameters {
   // What an earlier window's background counts at most, in start frames of this one; 0: windows
   // know nothing of each other.
   float earlier_share = 0.5f;
-  // Frames that are kept once they have left the window, as a share of it, but not more than half
+  // Frames that are kept once they have left the window, as a share of those of it that a solve
+  // looks at (mode=live: of all, some of which the next window still has), but not more than half
   // of the start frames.
   float remembered_share = 0.5f;
 };
@@ -72,7 +73,8 @@ class RobustLearner : public Learner {
   uint64_t bytes(int window_size, int capacity, Models models, int threads) const override;
   bool may_read_frames(int) const override { return false; }
   uint64_t bytes_to_unshare() const override {
-    return FrameMemory::bytes_to_unshare(remembered_frames(room_.window_size), shape());
+    return FrameMemory::bytes_to_unshare(remembered_frames(room_.window_size, room_.models),
+                                         shape());
   }
   double solve_seconds(int window_size, Models models) const override;
   uint64_t solver_bytes(int window_size) const override;
@@ -112,7 +114,7 @@ class RobustLearner : public Learner {
   }
   size_t samples_at(int step) const;
   SampledRows sampled_rows() const;
-  int remembered_frames(int window_size) const;
+  int remembered_frames(int window_size, Models models) const;
   // Windows that know nothing of each other are given nothing of each other.
   bool looks_ahead(Models models) const {
     return models != Models::two_of_live && parameters_.earlier_share > 0;
