@@ -134,15 +134,15 @@ static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps* ca
 }
 
 static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent* event) {
-  const GstVideoFilter* filter = GST_VIDEO_FILTER(trans);
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     GstVideoInfo info;
     gst_event_parse_caps(event, &caps);
     const bool known = gst_video_info_from_caps(&info, caps);
-    // Frames that wait belong to the old caps; equal caps change nothing.
-    if (!filter->negotiated || !known || !gst_video_info_is_equal(&info, &filter->in_info))
-      qdmd::drain(GST_ELEMENT(trans));
+    // Frames that wait belong to the old caps. Equal caps change nothing; others do, even if their
+    // video is the same: the base class sets them.
+    const qdmd::CapsPtr before(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(trans)));
+    if (!before || !gst_caps_is_equal(before.get(), caps)) qdmd::drain(GST_ELEMENT(trans));
     if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);
   }
   qdmd::before_event(GST_ELEMENT(trans), event);

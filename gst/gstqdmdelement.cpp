@@ -38,15 +38,13 @@ void set_load_location(GObject* object, const GValue* value) {
 }
 
 // Without locks.
-void warn_of_rectangles(GObject* object, const GValue* value, GParamSpec* spec) {
-  IgnoredAreas areas;
-  const guint left_out = add_areas_of(value, &areas);
+void warn_of_rectangles(GstElement* self, guint left_out) {
   if (left_out > 0)
     GST_ELEMENT_WARNING(
-        object, LIBRARY, SETTINGS,
-        ("%s leaves out %u rectangles: each has four whole numbers, x, y, width and "
+        self, LIBRARY, SETTINGS,
+        ("ignore leaves out %u rectangles: each has four whole numbers, x, y, width and "
          "height, the last two above 0, and there are at most %u.",
-         spec->name, left_out, guint(IgnoredAreas::kMost)),
+         left_out, guint(IgnoredAreas::kMost)),
         (nullptr));
 }
 
@@ -62,11 +60,14 @@ void set_property(GObject* object, guint id, const GValue* value, GParamSpec* sp
   get_setting(state->settings, id, &before);
   const bool known = set_setting(&state->settings, id, value);
   const bool running = GST_STATE(object) > GST_STATE_READY;
+  const guint left_out = state->settings.ignored_left_out;
   GST_OBJECT_UNLOCK(object);
   const bool changed = known && g_param_values_cmp(spec, &before, value) != 0;
   g_value_unset(&before);
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  if (GST_IS_PARAM_SPEC_ARRAY_LIST(spec)) warn_of_rectangles(object, value, spec);
+  // Before it starts, it may be in no pipeline that hears it.
+  if (GST_IS_PARAM_SPEC_ARRAY_LIST(spec) && running)
+    warn_of_rectangles(GST_ELEMENT(object), left_out);
   if (changed && running && (spec->flags & GST_PARAM_MUTABLE_READY))
     GST_ELEMENT_WARNING(object, LIBRARY, SETTINGS,
                         ("%s takes effect with the next caps, or when the element starts again "
@@ -201,7 +202,9 @@ bool start(GstElement* self) {
   GST_OBJECT_LOCK(self);
   state->counters = {};
   state->report = SolveReport();
+  const guint left_out = state->settings.ignored_left_out;
   GST_OBJECT_UNLOCK(self);
+  warn_of_rectangles(self, left_out);
   {
     const std::lock_guard lock(state->engine_lock);
     state->background.forget();

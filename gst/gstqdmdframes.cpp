@@ -497,6 +497,12 @@ static gint64 absorb_frames(GstElement* self, double seconds) {
   return gint64(std::clamp(std::round(seconds * rate), 1.0, 1e12));
 }
 
+// Metadata that is nothing but a hold on upstream's buffer.
+static gboolean leave_parent(GstBuffer*, GstMeta** meta, gpointer) {
+  if ((*meta)->info->api == GST_PARENT_BUFFER_META_API_TYPE) *meta = nullptr;
+  return TRUE;
+}
+
 GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
   State* state = state_of(self);
   // The base class asks for frames until there is none, or until downstream refuses one (it has
@@ -513,6 +519,7 @@ GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
       shell.get(), buffer.get(),
       GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
       0, gsize(-1));
+  gst_buffer_foreach_meta(shell.get(), leave_parent, nullptr);
   NewSolves solves;
   {
     const MappedVideoFrame frame(&state->info, buffer.get(), GST_MAP_READ);

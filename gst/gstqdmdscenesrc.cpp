@@ -352,9 +352,9 @@ static GstCaps* gst_qdmd_scene_src_fixate(GstBaseSrc* source, GstCaps* caps) {
 
 static gboolean gst_qdmd_scene_src_is_seekable(GstBaseSrc*) { return TRUE; }
 
-// To the frame that is on at the segment's position; backwards, to the one that is on before its
-// stop. False where there is no such frame.
-static bool locate(Private* priv, const GstSegment& segment) {
+// To the frame that is on at the segment's position; backwards, to the one before that. If the seek
+// gives no stop, the segment ends with the scene. False where the scene has no end, either.
+static bool locate(Private* priv, GstSegment& segment) {
   const auto rate = guint64(GST_VIDEO_INFO_FPS_N(&priv->info));
   const guint64 second = guint64(GST_VIDEO_INFO_FPS_D(&priv->info)) * GST_SECOND;
   const gint64 length = priv->scene->length();
@@ -367,24 +367,25 @@ static bool locate(Private* priv, const GstSegment& segment) {
     if (time_of(priv, priv->index + 1) <= segment.position) ++priv->index;
     return true;
   }
-  GstClockTime stop = segment.stop;
-  if (!GST_CLOCK_TIME_IS_VALID(stop)) {
+  if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) {
     if (length == 0) return false;
-    stop = time_of(priv, length);
+    segment.stop = segment.position = time_of(priv, length);
+    segment.offset = 0;
   }
-  priv->index = gint64(gst_util_uint64_scale_ceil(stop, rate, second)) - 1;
+  priv->index = gint64(gst_util_uint64_scale_ceil(segment.position, rate, second)) - 1;
   if (length > 0) priv->index = MIN(priv->index, length - 1);
   return true;
 }
 
-// True for a seek backwards in a scene that has no end, where the seek gives none. do_seek would
-// refuse it, too, but that is too late: the base class has flushed by then, and sends no segment.
+// True for a seek from the end of a scene that has none, and for one backwards there, where the
+// seek gives no end. do_seek would refuse it, too, but that is too late: the base class has flushed
+// by then, and sends no segment.
 static bool refuses(GstQdmdSceneSrc* self, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK) return false;
   gdouble rate;
-  GstSeekType stop_type;
+  GstSeekType start_type, stop_type;
   gint64 stop;
-  gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, &stop_type, &stop);
+  gst_event_parse_seek(event, &rate, nullptr, nullptr, &start_type, nullptr, &stop_type, &stop);
   GST_OBJECT_LOCK(self);
   const bool endless =
       GST_VIDEO_INFO_FPS_N(&self->priv->told_info) > 0 && self->priv->told_length == 0;
@@ -392,7 +393,8 @@ static bool refuses(GstQdmdSceneSrc* self, GstEvent* event) {
   const bool ends = stays ? GST_CLOCK_TIME_IS_VALID(self->priv->told_stop)
                           : stop_type == GST_SEEK_TYPE_SET && stop >= 0;
   GST_OBJECT_UNLOCK(self);
-  if (rate >= 0 || !endless || ends) return false;
+  const bool from_end = start_type == GST_SEEK_TYPE_END || stop_type == GST_SEEK_TYPE_END;
+  if (!endless || (!from_end && (rate >= 0 || ends))) return false;
   GST_WARNING_OBJECT(self, "%s", kNoEnd);
   return true;
 }
@@ -412,12 +414,12 @@ static gboolean gst_qdmd_scene_src_send_event(GstElement* element, GstEvent* eve
 static gboolean gst_qdmd_scene_src_do_seek(GstBaseSrc* source, GstSegment* segment) {
   Private* priv = GST_QDMD_SCENE_SRC(source)->priv;
   segment->time = segment->start;
+  const bool found = !priv->scene || locate(priv, *segment);
+  if (!priv->scene) priv->pending = *segment;
   GST_OBJECT_LOCK(source);
   priv->told_stop = segment->stop;
   GST_OBJECT_UNLOCK(source);
-  if (priv->scene) return locate(priv, *segment);
-  priv->pending = *segment;
-  return TRUE;
+  return found;
 }
 
 static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
@@ -444,11 +446,17 @@ static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
     priv->yuv.reset();
     if (!GST_VIDEO_INFO_IS_RGB(&info)) priv->yuv.emplace(info);
     if (priv->pending && !locate(priv, *priv->pending)) throw std::invalid_argument(kNoEnd);
-    priv->pending.reset();
+    // It was found before anybody knew the scene's end, and is sent after the caps.
+    GstSegment* const segment = &source->segment;
+    const gint64 length = priv->scene->length();
     GST_OBJECT_LOCK(self);
+    if (priv->pending) *segment = *priv->pending, priv->told_stop = segment->stop;
+    // What seeks from the end go by.
+    segment->duration = length > 0 ? time_of(priv, length) : GST_CLOCK_TIME_NONE;
     priv->told_info = info;
-    priv->told_length = priv->scene->length();
+    priv->told_length = length;
     GST_OBJECT_UNLOCK(self);
+    priv->pending.reset();
   });
 }
 

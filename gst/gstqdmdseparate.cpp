@@ -422,6 +422,8 @@ static void gst_qdmd_separate_init(GstQdmdSeparate* self) {
   gst_pad_set_query_function(sink, gst_qdmd_separate_sink_query);
   // A pad whose downstream does not take them does not stop the others.
   GST_PAD_SET_ACCEPT_TEMPLATE(sink);
+  // Video without a framerate is video, too.
+  GST_PAD_SET_ACCEPT_INTERSECT(sink);
   gst_element_add_pad(element, sink);
 }
 

@@ -236,7 +236,7 @@ const Property kProperties[] = {
      },
      [](Settings& s, const GValue* v) {
        s.ignored = {};
-       add_areas_of(v, &s.ignored);
+       s.ignored_left_out = add_areas_of(v, &s.ignored);
      },
      [](const Settings& s, GValue* v) { areas_to(s.ignored, v); }},
     {[](const Settings&) {

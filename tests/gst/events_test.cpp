@@ -92,6 +92,25 @@ TEST_F(HalfAWindow, CapsOfAnotherSizeSendItFirst) {
   for (const auto& buffer : out) EXPECT_EQ(40u * 24 * 3, gst_buffer_get_size(buffer.get()));
 }
 
+// Of the same video, in caps that say more of it.
+TEST_F(HalfAWindow, CapsThatSayMoreSendItFirst) {
+  GstCaps* caps = gst_video_info_to_caps(&stream_.info());
+  gst_caps_set_simple(caps, "content-light-level", G_TYPE_STRING, "1000:200", nullptr);
+  send(gst_event_new_caps(caps));
+  gst_caps_unref(caps);
+  expect_frames(0, 3);
+  expect_new_window(3);
+}
+
+TEST_F(HalfAWindow, EqualCapsLeaveItAsItIs) {
+  GstCaps* caps = gst_video_info_to_caps(&stream_.info());
+  send(gst_event_new_caps(caps));
+  gst_caps_unref(caps);
+  expect_frames(0, 0);
+  stream_.push_many(3, kWindow - 3);
+  expect_frames(0, 1);
+}
+
 TEST_F(HalfAWindow, DiscontSendsItFirst) {
   auto buffer = stream_.make_frame(3, paint_mover);
   GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
@@ -250,6 +269,21 @@ TEST_F(HalfAWindow, AllocationQueryAsksForNoBuffers) {
   gst_object_unref(pad);
   gst_query_unref(query);
   gst_caps_unref(caps);
+}
+
+// As sources do it that lend their memory: the buffer has a hold on the pool's.
+TEST(Pools, WhoseBuffersAreParentsDoNotStall) {
+  Stream stream("qdmdbackground window-size=50", GST_VIDEO_FORMAT_RGB, 40, 24);
+  const BufferPtr parent = stream.make_frame(0, paint_mover);
+  for (int t = 0; t < 20; ++t) {
+    GstBuffer* buffer = gst_buffer_copy_region(
+        parent.get(), GstBufferCopyFlags(GST_BUFFER_COPY_MEMORY), 0, gsize(-1));
+    gst_buffer_add_parent_buffer_meta(buffer, parent.get());
+    stream.stamp(buffer, t);
+    EXPECT_EQ(2, GST_MINI_OBJECT_REFCOUNT_VALUE(parent.get()));
+    ASSERT_EQ(GST_FLOW_OK, gst_harness_push(stream.harness(), buffer));
+    EXPECT_EQ(1, GST_MINI_OBJECT_REFCOUNT_VALUE(parent.get())) << t;
+  }
 }
 
 TEST(Pools, OfTwoBuffersUpstreamDoNotStall) {

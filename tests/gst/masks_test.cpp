@@ -92,6 +92,16 @@ void append(GValue* array, std::initializer_list<int> numbers) {
   gst_value_array_append_and_take_value(array, &rectangle);
 }
 
+// An element that is made from a text has its properties before it is in a pipeline that hears it.
+TEST(Ignore, SaysWhatItLeavesOutOnceItStarts) {
+  Stream stream("qdmdbackground ignore=<<1,2,3>>", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
+  Element element(stream);
+  gst_element_set_state(element.get(), GST_STATE_READY);
+  EXPECT_EQ("", element.warning());
+  gst_element_set_state(element.get(), GST_STATE_PLAYING);
+  EXPECT_NE(std::string::npos, element.warning().find("leaves out 1 rectangle"));
+}
+
 TEST(Ignore, LeavesOutWhatIsNoRectangleAndSaysSo) {
   Stream stream("qdmdbackground", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);

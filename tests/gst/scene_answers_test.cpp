@@ -140,6 +140,8 @@ TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
     EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_NONE, GST_CLOCK_TIME_NONE));
     EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_SET, GST_CLOCK_TIME_NONE));
     EXPECT_FALSE(seek_backwards(asked, GST_SEEK_TYPE_END, 0));
+    EXPECT_FALSE(gst_element_seek(asked, 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_END,
+                                  -gint64(GST_SECOND), GST_SEEK_TYPE_NONE, -1));
   }
   EXPECT_EQ(flushes, 0);
   EXPECT_TRUE(seek_backwards(pipeline.get(), GST_SEEK_TYPE_SET, GST_SECOND));

@@ -351,6 +351,50 @@ TEST(SceneSource, PlaysASegmentForwardsAndBackwards) {
   }
 }
 
+// Backwards, a seek without a stop begins at the scene's end; and seeks may count from there.
+TEST(SceneSource, SeeksKnowTheEndOfTheScene) {
+  constexpr auto kSet = GST_SEEK_TYPE_SET, kEnd = GST_SEEK_TYPE_END, kNone = GST_SEEK_TYPE_NONE;
+  struct Seek {
+    bool in_ready;  // before caps are known
+    double rate;
+    GstSeekType start_type;
+    int start;
+    GstSeekType stop_type;
+    int stop;
+    size_t first, count;
+  };
+  for (const Seek& seek :
+       {Seek{false, -1, kSet, 0, kNone, 0, 11, 12}, Seek{true, -1, kSet, 0, kNone, 0, 11, 12},
+        Seek{false, 1, kSet, 0, kEnd, -5, 0, 7}, Seek{false, 1, kEnd, -3, kNone, 0, 9, 3}}) {
+    Pipeline pipeline(std::string("qdmdscenesrc name=source scene=length=12 ! video/x-raw,") +
+                      kSmall);
+    if (seek.in_ready)
+      gst_element_set_state(pipeline.get(), GST_STATE_READY);
+    else
+      ASSERT_TRUE(pipeline.pause());
+    GstElement* source = gst_bin_get_by_name(GST_BIN(pipeline.get()), "source");
+    EXPECT_TRUE(gst_element_seek(source, seek.rate, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                 seek.start_type, seek.start * gint64(kFrame), seek.stop_type,
+                                 seek.stop_type == kNone ? -1 : seek.stop * gint64(kFrame)));
+    EXPECT_EQ(pipeline.play(), "");
+    ASSERT_EQ(pipeline.frames.size(), seek.count) << seek.rate;
+    EXPECT_EQ(pipeline.frames[0].offset, seek.first);
+    GstPad* pad = gst_element_get_static_pad(source, "src");
+    GstEvent* event = gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0);
+    ASSERT_NE(event, nullptr);
+    const GstSegment* segment = nullptr;
+    gst_event_parse_segment(event, &segment);
+    if (seek.rate < 0) {
+      EXPECT_EQ(segment->stop, 12 * kFrame) << seek.in_ready;
+      // What sinks show first is shown at once.
+      EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, 12 * kFrame), 0u);
+    }
+    gst_event_unref(event);
+    gst_object_unref(pad);
+    gst_object_unref(source);
+  }
+}
+
 TEST(SceneSource, ASceneWithALengthEnds) {
   Pipeline pipeline(std::string("qdmdscenesrc scene=length=12 ! video/x-raw,") + kSmall);
   ASSERT_TRUE(pipeline.pause());

@@ -12,6 +12,20 @@ namespace {
 const std::vector<std::string> kPads = {"background", "foreground", "mask", "cutout"};
 constexpr const char* kSmall = " method=qdmd rank=1 window-size=6 hop-size=2";
 
+TEST(SeparateCaps, MayHaveNoFramerate) {
+  GstHarness* harness = gst_harness_new_with_padnames("qdmdseparate", "sink", "background");
+  gst_harness_set_src_caps_str(harness, "video/x-raw,format=GRAY8,width=16,height=16");
+  for (int t = 0; t < 5; ++t) {
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 256, nullptr);
+    gst_buffer_memset(buffer, 0, 9, 256);
+    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(t) * kFrame;
+    EXPECT_EQ(GST_FLOW_OK, gst_harness_push(harness, buffer));
+  }
+  EXPECT_TRUE(gst_harness_push_event(harness, gst_event_new_eos()));
+  EXPECT_EQ(5u, gst_harness_buffers_in_queue(harness));
+  gst_harness_teardown(harness);
+}
+
 TEST(Memory, IsThatOfOneWindow) {
   const std::string options = std::string(kSmall) + " max-memory=";
   const auto starts = [&](const std::string& element, guint64 most, bool pads) {
