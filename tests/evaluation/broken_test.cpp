@@ -77,6 +77,11 @@ TEST(Broken, TruthAndMasksAreLeftOut) {
   write_text(data / "text/gt/GT_text.png", "no picture");
   write_sequence(data / "labels", 6, true);
   write(data / "labels/gt/masks/gt000002.png", cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(100)));
+  write_sequence(data / "numbers", 6);
+  write(data / "numbers/gt/masks/gt000099.png", labels_at(0));
+  write_sequence(data / "region", 6, true);
+  write_text(data / "region/gt/temporalROI.txt", "from here");
+  write(data / "region/gt/ROI.bmp", cv::Mat(kHeight + 1, kWidth, CV_8UC1, cv::Scalar(255)));
   // Also where finished results are there to be used.
   for (int run = 0; run < 2; ++run) {
     const Result result = evaluate({"--dataset", data.string(), "--methods", "qdmd", "--format",
@@ -87,7 +92,14 @@ TEST(Broken, TruthAndMasksAreLeftOut) {
     EXPECT_TRUE(result.says("text: truth left out, cannot read gt/GT_text.png")) << result.err;
     EXPECT_TRUE(result.says("labels: masks left out, gt/masks/gt000002.png: label 100"))
         << result.err;
+    EXPECT_TRUE(result.says("numbers: masks left out: none of them has the number of a frame"))
+        << result.err;
+    EXPECT_TRUE(result.says("region: temporalROI.txt left out: it has not")) << result.err;
+    EXPECT_TRUE(result.says("region: masks left out, two sizes: gt/ROI.bmp has 48x37"))
+        << result.err;
     const auto table = result.json();
+    EXPECT_TRUE(row_of(table, "numbers", "qdmd").at("F").is_null());
+    EXPECT_TRUE(row_of(table, "region", "qdmd").at("F").is_null());
     EXPECT_TRUE(row_of(table, "size", "qdmd").at("AGE").is_null());
     EXPECT_TRUE(row_of(table, "size", "qdmd").at("F").is_number());
     EXPECT_TRUE(row_of(table, "text", "qdmd").at("AGE").is_null());

@@ -6,8 +6,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "core/metrics/mask_scores.h"
-
 namespace qdmd::evaluation {
 
 namespace fs = std::filesystem;
@@ -54,9 +52,16 @@ void require_size(const cv::Mat& picture, const fs::path& path, const cv::Mat& f
 void read_labels(const Sequence& sequence, const std::vector<fs::path>& paths, LabelledClip* clip) {
   std::vector<cv::Mat> labels(paths.size());
   bool any = false;
+  cv::Mat region;
+  if (!sequence.region.empty()) {
+    region = read_picture(sequence.region, cv::IMREAD_GRAYSCALE, sequence.folder);
+    require_size(region, sequence.region, clip->frames[0], paths[0], sequence.folder);
+  }
   for (size_t i = 0; i < paths.size(); ++i) {
     uint64_t number = 0;
-    if (!frame_number(paths[i], &number) || !sequence.masks.contains(number)) continue;
+    if (!frame_number(paths[i], &number) || !sequence.masks.contains(number) ||
+        number < sequence.first_scored || number > sequence.last_scored)
+      continue;
     const fs::path& path = sequence.masks.at(number);
     labels[i] = read_picture(path, cv::IMREAD_GRAYSCALE, sequence.folder);
     require_size(labels[i], path, clip->frames[0], paths[0], sequence.folder);
@@ -65,6 +70,7 @@ void read_labels(const Sequence& sequence, const std::vector<fs::path>& paths, L
     } catch (const std::invalid_argument& error) {
       throw std::runtime_error(fs::relative(path, sequence.folder).string() + ": " + error.what());
     }
+    if (!region.empty()) labels[i].setTo(static_cast<double>(MaskLabel::outside), region == 0);
     any = true;
   }
   if (any) clip->labels = std::move(labels);
@@ -95,6 +101,11 @@ std::vector<fs::path> Selection::of(const Sequence& sequence) const {
   }
   if (reverse) std::reverse(chosen.begin(), chosen.end());
   return chosen;
+}
+
+void LabelledClip::score(size_t frame, const uint8_t* mask, MaskCounts* counts) const {
+  if (frame >= labels.size() || labels[frame].empty()) return;
+  counts->add(mask, labels[frame].data, labels[frame].total());
 }
 
 LabelledClip read_clip(const Sequence& sequence, const Selection& selection) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/image_view.h"
+#include "core/metrics/mask_scores.h"
 #include "tests/evaluation/dataset.h"
 
 namespace qdmd::evaluation {
@@ -23,8 +24,14 @@ struct Selection {
 struct LabelledClip {
   std::vector<cv::Mat> frames;  // 8-bit BGR, all of one size
   cv::Mat truth;                // 8-bit BGR of that size; empty: none
-  std::vector<cv::Mat> labels;  // of frames with a mask, 8-bit; others empty. No elements: no masks
+  // Of frames whose mask counts, 8-bit, pixels outside of the sequence's region
+  // MaskLabel::outside; others empty. No elements: no masks.
+  std::vector<cv::Mat> labels;
   std::vector<std::string> problems;  // why a truth or masks had to be left out
+
+  // Counts the mask of a frame, which is counted from 0, in row order. Does nothing where no true
+  // mask counts.
+  void score(size_t frame, const uint8_t* mask, MaskCounts* counts) const;
 };
 
 // Throws std::runtime_error that names the file where a frame cannot be read or has another size

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <fstream>
 #include <set>
 
 namespace qdmd::evaluation {
@@ -68,6 +69,26 @@ bool is_mask_name(const fs::path& path) {
                      [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+// CDnet's pictures of the region in which masks count.
+bool is_region_name(const fs::path& path) { return path.stem() == "ROI"; }
+
+// What CDnet says of the masks that count.
+void read_region(Sequence* sequence) {
+  for (const char* part : {"", "gt", "GT", "groundtruth"}) {
+    const fs::path folder = sequence->folder / part;
+    std::error_code error;
+    if (fs::is_regular_file(folder / "ROI.bmp", error)) sequence->region = folder / "ROI.bmp";
+    std::ifstream frames(folder / "temporalROI.txt");
+    uint64_t first = 0, last = 0;
+    if (!frames) continue;
+    if (frames >> first >> last && first <= last)
+      sequence->first_scored = first, sequence->last_scored = last;
+    else
+      sequence->problems.push_back(
+          "temporalROI.txt left out: it has not the numbers of a first and a last frame");
+  }
+}
+
 // 0 is best.
 int truth_order(const fs::path& path) {
   const std::string name = path.filename().string();
@@ -92,7 +113,7 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
       uint64_t number = 0;
       if (part == std::string("groundtruth") && is_mask_name(file) && frame_number(file, &number))
         sequence.masks[number] = file;
-      else
+      else if (!is_region_name(file))
         truths.push_back(file);
     }
   for (const auto& file : pictures_in(folder / "gt" / "masks", &sequence.problems)) {
@@ -103,6 +124,7 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
       truths.begin(), truths.end(),
       [](const fs::path& a, const fs::path& b) { return truth_order(a) < truth_order(b); });
   if (best != truths.end()) sequence.truth = *best;
+  read_region(&sequence);
 
   if (sequence.frames.empty())
     sequence.problems.push_back(fs::is_directory(folder / "input")
@@ -110,6 +132,13 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
                                     : "no frames: there is no folder input/");
   else if (sequence.frames.size() == 1)
     sequence.problems.push_back("one frame only: nothing in it can be told apart by motion");
+  const bool any_mask = std::any_of(
+      sequence.frames.begin(), sequence.frames.end(), [&sequence](const fs::path& frame) {
+        uint64_t number = 0;
+        return frame_number(frame, &number) && sequence.masks.contains(number);
+      });
+  if (!sequence.frames.empty() && !sequence.masks.empty() && !any_mask)
+    sequence.problems.push_back("masks left out: none of them has the number of a frame");
   // CDnet has masks and no background pictures: nothing is missing there.
   if (truths.empty() && sequence.masks.empty())
     sequence.problems.push_back(

@@ -128,6 +128,43 @@ TEST(Layouts, TheOfficialTruthGoesBeforeTheDerivedOne) {
   EXPECT_LT(row_of(table, "s", "median").at("AGE"), 5);
 }
 
+// Beside input/ in CDnet's own folders, in gt/ in ours.
+TEST(Layouts, TheRegionOfInterestIsNoTruthAndMasksFollowIt) {
+  constexpr int kFrames = 8;
+  const Folder data;
+  const cv::Mat white(kHeight, kWidth, CV_8UC1, cv::Scalar(255));
+  cv::Mat region = white.clone();
+  region.colRange(0, kWidth / 2) = 0;
+  for (const std::string name : {"cdnet", "ours", "marked"}) {
+    write_frames(data / name, kFrames);
+    const fs::path masks = name == "ours" ? data / "ours/gt/masks" : data / name / "groundtruth";
+    for (int t = 0; t < kFrames; ++t) {
+      cv::Mat labels = labels_at(t);
+      if (name == "marked") labels.setTo(85, region == 0);
+      if (name != "marked" || (t >= 3 && t <= 5)) write(masks / numbered("gt", t), labels);
+    }
+  }
+  write(data / "cdnet/ROI.bmp", region);
+  write_text(data / "cdnet/temporalROI.txt", "3 5\n");
+  write(data / "ours/gt/ROI.bmp", region);
+  write_text(data / "ours/gt/temporalROI.txt", "3 5");
+  const auto run = [&data] {
+    const Result result =
+        evaluate({"--dataset", data.string(), "--methods", "qdmd", "--format", "json"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.json();
+  };
+  const auto table = run();
+  for (const char* name : {"cdnet", "ours"}) {
+    const auto row = row_of(table, name, "qdmd"), marked = row_of(table, "marked", "qdmd");
+    EXPECT_TRUE(row.at("AGE").is_null()) << row;
+    for (const char* column : {"precision", "recall", "F"})
+      EXPECT_EQ(row.at(column), marked.at(column)) << name << " " << column;
+  }
+  write(data / "cdnet/ROI.bmp", white);
+  EXPECT_NE(row_of(run(), "cdnet", "qdmd").at("F"), row_of(table, "cdnet", "qdmd").at("F"));
+}
+
 // ---- Frames and pictures ----
 
 TEST(Selection, TakesTheFramesThatItSays) {

@@ -9,7 +9,6 @@
 #include "core/passes/planes.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"
-#include "tests/evaluation/mask_truth.h"
 
 namespace {
 
@@ -123,8 +122,8 @@ void watch(const LabelledClip& clip,
 }
 
 // F of each set of constants.
-std::vector<double> scores(const LabelledClip& clip, const Sequence& sequence,
-                           const std::vector<DecisionConstants>& sets, Pool* pool) {
+std::vector<double> scores(const LabelledClip& clip, const std::vector<DecisionConstants>& sets,
+                           Pool* pool) {
   const cv::Size size = clip.frames[0].size();
   const auto pixels = clip.frames[0].total();
   std::vector<std::unique_ptr<Decision>> decisions;
@@ -133,7 +132,6 @@ std::vector<double> scores(const LabelledClip& clip, const Sequence& sequence,
     steps.constants = set;
     decisions.push_back(std::make_unique<Decision>(size.width, size.height, Colours::rgb, steps));
   }
-  const MaskTruth truth(clip, sequence);
   std::vector<MaskCounts> counts(sets.size());
   BackgroundModel model;
   model.make_room(pixels, true);
@@ -147,7 +145,7 @@ std::vector<double> scores(const LabelledClip& clip, const Sequence& sequence,
                             seen.threshold,
                             model.limits()},
                            nullptr);
-      if (!rehearsal) truth.add(frame, decisions[i]->mask(), &counts[i]);
+      if (!rehearsal) clip.score(frame, decisions[i]->mask(), &counts[i]);
     };
     // Labels that are none throw here.
     decide(0);
@@ -186,7 +184,7 @@ int main(int argc, char** argv) try {
     for (const Sequence& sequence : find_sequences(dataset)) {
       if (sequence.masks.empty()) continue;
       std::fprintf(stderr, "\r%-60s", sequence.name.c_str());
-      const auto found = scores(read_clip(sequence, {}), sequence, sets, &pool);
+      const auto found = scores(read_clip(sequence, {}), sets, &pool);
       for (size_t i = 0; i < sets.size(); ++i) sums[i] += found[i];
       ++count;
     }

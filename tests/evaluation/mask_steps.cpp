@@ -12,7 +12,6 @@
 #include "core/engine/engine.h"
 #include "tests/evaluation/clip.h"
 #include "tests/evaluation/dataset.h"
-#include "tests/evaluation/mask_truth.h"
 
 namespace {
 
@@ -105,11 +104,10 @@ std::vector<Variant> variants() {
   return all;
 }
 
-double score(const LabelledClip& clip, const Sequence& sequence, const Variant& variant) {
-  const MaskTruth truth(clip, sequence);
+double score(const LabelledClip& clip, const Variant& variant) {
   MaskCounts counts;
   size_t frame = 0;
-  variant.run(clip, [&](const cv::Mat& mask) { truth.add(frame++, mask.data, &counts); });
+  variant.run(clip, [&](const cv::Mat& mask) { clip.score(frame++, mask.data, &counts); });
   return counts.f_measure().value_or(1);
 }
 
@@ -186,7 +184,7 @@ int main(int argc, char** argv) try {
     for (size_t v = 0; v < chosen.size(); ++v) {
       std::fprintf(stderr, "\r%zu of %zu sequences, %-50s", s + 1, sequences.size(),
                    chosen[v].name.c_str());
-      scores[v].push_back(score(clip, sequences[s], chosen[v]));
+      scores[v].push_back(score(clip, chosen[v]));
     }
   }
   std::fprintf(stderr, "\n");

@@ -69,6 +69,8 @@ class Runner {
     for (const auto& frame : plan_.selection.of(sequence)) key += fingerprint(frame);
     if (!sequence.truth.empty()) key += fingerprint(sequence.truth);
     for (const auto& mask : sequence.masks) key += fingerprint(mask.second);
+    if (!sequence.region.empty()) key += fingerprint(sequence.region);
+    key += std::to_string(sequence.first_scored) + " " + std::to_string(sequence.last_scored);
     return key;
   }
 
@@ -143,9 +145,8 @@ class Runner {
     if (!clip.truth.empty())
       row.picture = score_picture(view_of(separation.background), view_of(clip.truth));
     MaskCounts counts;
-    for (size_t i = 0; i < separation.masks.size() && i < clip.labels.size(); ++i)
-      if (!clip.labels[i].empty())
-        counts.add(separation.masks[i].data, clip.labels[i].data, clip.labels[i].total());
+    for (size_t i = 0; i < separation.masks.size(); ++i)
+      clip.score(i, separation.masks[i].data, &counts);
     if (!separation.masks.empty()) {
       row.precision = counts.precision();
       row.recall = counts.recall();
