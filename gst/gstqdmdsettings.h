@@ -25,7 +25,7 @@ struct Settings {
   double absorb_time = 300;  // seconds; 0: never
   IgnoredAreas ignored;
   guint ignored_left_out = 0;  // rectangles that are none, or too many
-  GQuark ignored_type = 0;  // of regions of interest that are ignored, too; 0: none
+  GQuark ignored_type = 0;     // of regions of interest that are ignored, too; 0: none
   EngineOptions engine = with_stabilize(Stabilize::translation);
   guint asked = 0;  // what somebody has set, a bit for each id
 };

@@ -41,6 +41,21 @@ std::string fraction_of(double rate) {
   return std::to_string(numerator) + "/" + std::to_string(denominator);
 }
 
+// Decoders fill up what a JPEG lacks and say nothing. In a whole one, the last start of scan comes
+// before the end of image.
+bool is_cut_jpeg(const std::string& bytes) {
+  if (!bytes.starts_with("\xFF\xD8")) return false;
+  const size_t end = bytes.rfind("\xFF\xD9"), scan = bytes.rfind("\xFF\xDA");
+  return end == std::string::npos || scan == std::string::npos || end < scan;
+}
+
+// GStreamer 1.22 mixes up the colours of such a PNG.
+bool has_deep_colours(const std::string& bytes) {
+  constexpr size_t kDepth = 24, kKind = 25;  // of the chunk IHDR, which comes first
+  return bytes.starts_with("\x89PNG") && bytes.size() > kKind && bytes[kDepth] == 16 &&
+         bytes[kKind] != 0;
+}
+
 // The pictures of a folder: those of the first kind that there is.
 std::vector<std::string> pictures_of(const fs::path& folder) {
   std::vector<std::string> all;
@@ -136,7 +151,8 @@ FrameReader::~FrameReader() {
 // The next file, or all pictures.
 void FrameReader::open() {
   const std::string end =
-      " ! videocrop name=crop ! videoconvert ! video/x-raw,format=BGRx ! appsink name=sink "
+      " ! videocrop name=crop ! videoconvert ! video/x-raw,format=BGRx ! appsink "
+      "name=sink "
       "sync=false "
       "max-buffers=2";
   if (pictures_) {
@@ -170,7 +186,12 @@ bool FrameReader::feed() {
     return false;
   }
   std::ifstream file(files_[next_file_], std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (bytes.empty()) throw std::runtime_error(files_[next_file_] + " is empty, or cannot be read");
+  if (is_cut_jpeg(bytes)) throw std::runtime_error(files_[next_file_] + " is cut off");
+  if (has_deep_colours(bytes))
+    throw std::runtime_error(files_[next_file_] +
+                             " has colours of 16 bits, which are not read: convert it to 8 bits");
   GstBuffer* const buffer = gst_buffer_new_memdup(bytes.data(), bytes.size());
   GST_BUFFER_PTS(buffer) =
       static_cast<GstClockTime>(std::llround(static_cast<double>(next_file_) * GST_SECOND / rate_));
@@ -190,6 +211,7 @@ bool FrameReader::next() {
       open();
     }
     if (next_of_file()) return true;
+    note_early_end();
     pipeline_.reset();
     begin_ = end_;
     if (pictures_) return false;
@@ -262,6 +284,20 @@ ImageView FrameReader::view() const {
   view.pixel_stride = 4;
   view.row_stride = stride;
   return view;
+}
+
+void FrameReader::note_early_end() {
+  // Containers round, and count sound.
+  constexpr GstClockTime kLeast = GST_SECOND;
+  gint64 duration = 0;
+  if (pictures_ || !gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration) ||
+      duration <= 0)
+    return;
+  const auto length = static_cast<GstClockTime>(duration), seen = end_ - begin_;
+  if (seen + std::max(kLeast, length / 50) < length)
+    early_ends_.push_back(files_[next_file_ - 1] + " ends after " +
+                          std::to_string(seen / GST_SECOND) + " s of " +
+                          std::to_string(length / GST_SECOND) + " s: is it cut off?");
 }
 
 double FrameReader::share() const {

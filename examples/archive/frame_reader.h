@@ -42,15 +42,18 @@ class FrameReader {
   // The share of the recording that was read, 0 .. 1, about.
   double share() const;
   const RecordingInfo& info() const { return info_; }
+  // Of each file that was read to an end long before the one that it names, a sentence.
+  const std::vector<std::string>& early_ends() const { return early_ends_; }
 
  private:
   struct Crop;
   void open();
   bool feed();
   bool next_of_file();
+  void note_early_end();
   void take(SamplePtr sample);
 
-  std::vector<std::string> files_;
+  std::vector<std::string> files_, early_ends_;
   bool pictures_ = false;
   double rate_;
   std::function<Rows(const RecordingInfo&)> choose_;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -24,6 +25,18 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kSamples = 3;  // R, G, B of pictures that are gathered
 
+// Names of files may have any bytes, and JSON has none but those of a text.
+std::string as_text(const std::string& name) {
+  std::string text;
+  for (const char letter : name) {
+    char code[4];
+    std::snprintf(code, sizeof code, "%%%02X", static_cast<unsigned char>(letter));
+    const bool plain = letter >= ' ' && letter < 127 && letter != '%';
+    text += plain ? std::string(1, letter) : code;
+  }
+  return text;
+}
+
 // What the files depend on, but not how many processes write them.
 std::string settings_of(const JobOptions& options) {
   std::ostringstream text;
@@ -38,10 +51,21 @@ std::string settings_of(const JobOptions& options) {
        << engine.foreground_threshold << " shadows " << static_cast<int>(options.shadows)
        << " absorb-time " << options.absorb_time << " rate " << options.rate << " encoder "
        << options.encoder;
-  for (const std::string& path : options.recordings) text << " from " << fs::absolute(path);
+  for (const std::string& path : options.recordings)
+    text << " from " << as_text(fs::absolute(path).string());
   for (const Wanted& wanted : options.wanted)
-    text << " to " << static_cast<int>(wanted.output) << " " << fs::absolute(wanted.path);
+    text << " to " << static_cast<int>(wanted.output) << " "
+         << as_text(fs::absolute(wanted.path).string());
   return text.str();
+}
+
+// That somebody can write there; nobody wants to hear it at the end.
+void check_report(const std::string& path) {
+  if (path.empty() || path == "-") return;
+  const std::string temporary = temporary_of(path);
+  if (fs::is_directory(path) || !std::ofstream(temporary))
+    throw std::runtime_error(path + " cannot be written");
+  fs::remove(temporary);
 }
 
 class Job {
@@ -57,6 +81,7 @@ class Job {
     engine_options_.team = team;
     engine_options_.remembers = false;
     done_.settings = settings_of(options);
+    if (writes()) check_report(options.report);
     if (options.resume) go_on();
   }
 
@@ -65,6 +90,9 @@ class Job {
     if (team_) team_->wait_for_all();
     if (!done_.ended) read_all();
     if (writes()) finish();
+    if (writes() && !options_.quiet)
+      for (const std::string& sentence : reader_.early_ends())
+        std::fprintf(stderr, "qdmd-archive: %s\n", sentence.c_str());
     if (team_) team_->wait_for_all();
     report();
   }
@@ -363,11 +391,12 @@ class Job {
                        {"of-process", processes},
                        {"bytes-received-a-frame", bytes},
                        {"solves", solves_}};
-    std::FILE* const file =
-        options_.report == "-" ? stdout : std::fopen(options_.report.c_str(), "w");
-    if (!file) throw std::runtime_error(options_.report + " cannot be written");
-    std::fprintf(file, "%s\n", json.dump(1).c_str());
-    if (file != stdout) std::fclose(file);
+    if (options_.report == "-") {
+      std::printf("%s\n", json.dump(1).c_str());
+      return;
+    }
+    std::ofstream(temporary_of(options_.report)) << json.dump(1) << '\n';
+    give_name(options_.report);
   }
 
   const JobOptions& options_;
@@ -390,7 +419,10 @@ class Job {
 }  // namespace
 
 void run_job(const JobOptions& options, MpiTeam* team) {
-  check_wanted(options.wanted);
+  check_wanted(options.wanted, options.recordings, options.report);
+  for (double number : {options.engine.dmd.omega_threshold, options.engine.foreground_threshold,
+                        options.absorb_time, options.rate})
+    if (!std::isfinite(number)) throw std::invalid_argument("an option is not a finite number");
   Job(options, team).run();
 }
 

@@ -37,17 +37,47 @@ const char* option_of(Output output) {
   return "--cutout";
 }
 
+bool is_same(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error);
+}
+
+// True for picture_of(path, window) with a window above 0.
+bool is_later_picture(const fs::path& name, const fs::path& path) {
+  const std::string stem = name.stem().string(), first = path.stem().string() + "-";
+  return name.extension() == path.extension() && stem.starts_with(first) &&
+         stem.find_first_not_of("0123456789", first.size()) == std::string::npos;
+}
+
+void check_not_read(const std::string& path, bool is_picture,
+                    const std::vector<std::string>& recordings) {
+  const fs::path beside = fs::absolute(path).parent_path();
+  for (const fs::path recording : recordings) {
+    std::error_code error;
+    if (is_picture && fs::is_directory(recording, error) && is_same(recording, beside))
+      throw std::invalid_argument(path +
+                                  " is in the folder of pictures that is read: give it "
+                                  "another folder");
+    const bool later = is_picture && is_later_picture(recording, path) &&
+                       is_same(fs::absolute(recording).parent_path(), beside);
+    if (later || is_same(recording, path))
+      throw std::invalid_argument(path + " would replace " + recording.string() +
+                                  ", which is read: give it another name");
+  }
+}
+
 }  // namespace
 
 bool Wanted::is_picture() const { return fs::path(path).extension() == ".png"; }
 
-void check_wanted(const std::vector<Wanted>& wanted) {
+void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::string>& recordings,
+                  const std::string& report) {
   if (wanted.empty())
     throw std::invalid_argument(
         "nothing is to be written: give --background, --mask, --foreground or --cutout");
   for (const Wanted& one : wanted) {
     const fs::path path(one.path);
-    if (one.is_picture() && one.output != Output::background)
+    if (path.extension() != ".mkv" && one.output != Output::background)
       throw std::invalid_argument(std::string(option_of(one.output)) +
                                   " is a video: give it a name that ends in .mkv");
     if (!one.is_picture() && path.extension() != ".mkv")
@@ -56,7 +86,11 @@ void check_wanted(const std::vector<Wanted>& wanted) {
     for (const Wanted& other : wanted)
       if (&other != &one && fs::absolute(other.path) == fs::absolute(path))
         throw std::invalid_argument(one.path + " is named twice");
+    check_not_read(one.path, one.is_picture(), recordings);
+    if (!report.empty() && fs::absolute(report) == fs::absolute(path))
+      throw std::invalid_argument(report + " is named twice");
   }
+  if (!report.empty() && report != "-") check_not_read(report, false, recordings);
 }
 
 Outputs::Outputs(std::vector<Wanted> wanted, int width, int height, double rate,

@@ -22,8 +22,11 @@ struct Wanted {
   bool is_picture() const;
 };
 
-// Throws std::invalid_argument with a sentence for the user.
-void check_wanted(const std::vector<Wanted>& wanted);
+// Throws std::invalid_argument with a sentence for the user: also where a file that is read, or one
+// of a folder of pictures that is, would be replaced by what is wanted or by `report` (a file's
+// name, or "-" or empty).
+void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::string>& recordings,
+                  const std::string& report);
 
 // A video has a file for each window in a folder beside it, and is joined of these at the end: a
 // video that is written to as one cannot be gone on with. A picture of a window's background has

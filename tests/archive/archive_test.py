@@ -8,11 +8,14 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
 import time
+import zlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / 'examples'))
 import common
@@ -378,9 +381,89 @@ def failing_process(folder):
     assert 'missing.mkv' in said, said
 
 
+def pictures_of(folder, name, kind='png', pixels='RGB', frames=6):
+    made = folder / name
+    made.mkdir()
+    encoder = {'png': 'pngenc', 'jpg': 'jpegenc'}[kind]
+    common.play(f'videotestsrc pattern=ball num-buffers={frames} ! '
+                f'video/x-raw,width=48,height=36,format={pixels} ! {encoder} ! '
+                f'multifilesink location="{made}/%02d.{kind}"').set_state(Gst.State.NULL)
+    return made
+
+
+def what_is_read_stays(folder):
+    shots = pictures_of(folder, 'shots')
+    clip = folder / 'mine.mkv'
+    make_clip(clip, 12)
+    (folder / 'link.mkv').symlink_to(clip)
+    before = {path: path.read_bytes() for path in (clip, *shots.iterdir())}
+    inside = shots / 'b.png'
+    for words in ([clip, '--mask', clip], [clip, '--background', folder / 'link.mkv'],
+                  [clip, '--mask', 'shots/../mine.mkv'], [shots, '--background', shots / '00.png'],
+                  [shots, '--background', inside], [clip, '--mask', 'm.mkv', '--report', clip],
+                  [shots / '01.png', '--background', shots / '01.png']):
+        text = run(folder, 0, *words, '--window', 4, expect=2)
+        assert 'is read' in text, f'{words}: {text}'
+    shutil.copy(shots / '01.png', folder / 'later-2.png')
+    text = run(folder, 0, folder / 'later-2.png', '--background', 'later.png', expect=2)
+    assert 'later-2.png, which is read' in text, text
+    assert {path: path.read_bytes() for path in (clip, *shots.iterdir())} == before
+    text = run(folder, 0, clip, '--mask', 'm.mkv', '--report', 'm.mkv', expect=2)
+    assert 'twice' in text, text
+
+
+def write_deep_png(path, level, size=40):
+    """A picture of 16 bits a sample, which no element of ours writes."""
+    def chunk(name, data):
+        return (struct.pack('>I', len(data)) + name + data
+                + struct.pack('>I', zlib.crc32(name + data)))
+
+    row = b'\0' + struct.pack('>3H', level, 2 * level, 100) * size
+    path.write_bytes(b'\x89PNG\r\n\x1a\n'
+                     + chunk(b'IHDR', struct.pack('>2I5B', size, size, 16, 2, 0, 0, 0))
+                     + chunk(b'IDAT', zlib.compress(row * size)) + chunk(b'IEND', b''))
+
+
+def pictures_that_are_odd(folder):
+    (folder / 'deep').mkdir()
+    write_deep_png(folder / 'deep' / '1.png', 50 * 257)
+    text = run(folder, 0, folder / 'deep', '--background', 'n.png', expect=1)
+    assert 'convert it to 8 bits' in text, text
+    # A name that is no text.
+    strange = os.fsdecode(b'u\xff')
+    clip = folder / (strange + '.mkv')
+    shutil.copy(folder / 'clip.mkv', clip)
+    run(folder, 0, clip, *outputs(folder, strange), '--window', 20, '--quiet', '--resume')
+    assert not leftovers(folder, strange)
+    for kind in ('png', 'jpg'):
+        made = pictures_of(folder, 'none-' + kind, kind)
+        (made / f'03.{kind}').write_bytes(b'')
+        for processes in (0, 2):
+            text = run(folder, processes, made, '--background', 'n.png', expect=1)
+            assert f'03.{kind} is empty' in text, text
+    cut = pictures_of(folder, 'cut', 'jpg')
+    whole = (cut / '03.jpg').read_bytes()
+    (cut / '03.jpg').write_bytes(whole[:len(whole) // 2])
+    text = run(folder, 0, cut, '--background', 'n.png', expect=1)
+    assert '03.jpg is cut off' in text, text
+
+
+def a_recording_that_is_cut_off(folder):
+    clip = folder / 'whole.mkv'
+    make_clip(clip, 100)
+    text = run(folder, 0, clip, '--background', 'w.png', '--window', 50)
+    assert 'cut off' not in text, text
+    whole = clip.read_bytes()
+    (folder / 'half.mkv').write_bytes(whole[:len(whole) // 2])
+    text = run(folder, 2, folder / 'half.mkv', '--background', 'w.png', '--window', 50)
+    assert text.count('of 4 s: is it cut off?') == 1, text
+
+
 def errors(folder):
     clip = folder / 'clip.mkv'
     for words, reason in (
+            ([clip, '--mask', 'm.mkv', '--absorb-time', 'nan'], 'finite'),
+            ([clip, '--mask', 'm.mkv', '--report', 'no/folder/r.json'], 'r.json cannot'),
             ([clip], 'nothing is to be written'),
             ([clip, '--mask', 'mask.png'], '.mkv'),
             ([clip, '--mask', 'mask.avi'], '.mkv'),
@@ -417,6 +500,8 @@ def main():
     cases += [(check.__name__.replace('_', ' '), check)
               for check in (files_and_pictures, more_outputs, killed_and_resumed,
                             killed_while_parts_are_removed, resumed_with_other_options,
+                            what_is_read_stays, pictures_that_are_odd,
+                            a_recording_that_is_cut_off,
                             memory_of_processes, memory_of_frames_is_used_again,
                             failing_process, errors)]
     words = sys.argv[3:]
