@@ -139,8 +139,8 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
     GstVideoInfo info;
     gst_event_parse_caps(event, &caps);
     const bool known = gst_video_info_from_caps(&info, caps);
-    // Frames that wait belong to the old caps. Equal caps change nothing; others do, even if their
-    // video is the same: the base class sets them.
+    // Frames that wait belong to the old caps. The base class sets any others, even if the video is
+    // the same.
     const qdmd::CapsPtr before(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(trans)));
     if (!before || !gst_caps_is_equal(before.get(), caps)) qdmd::drain(GST_ELEMENT(trans));
     if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);

@@ -244,7 +244,7 @@ void tell_of_caps(GstElement* self, GstCaps* caps) {
   const GstStructure* video = gst_caps_get_structure(caps, 0);
   gst_structure_get_int(video, "width", &width);
   gst_structure_get_int(video, "height", &height);
-  if (width < 1 || height < 1) {
+  if (width < 1 || height < 1 || !gst_structure_has_field(video, "format")) {
     GST_ELEMENT_ERROR(self, STREAM, FORMAT,
                       ("Caps without a format, a width and a height are no video: put a capsfilter "
                        "that has them before %s.",

@@ -352,12 +352,13 @@ static GstCaps* gst_qdmd_scene_src_fixate(GstBaseSrc* source, GstCaps* caps) {
 
 static gboolean gst_qdmd_scene_src_is_seekable(GstBaseSrc*) { return TRUE; }
 
-// To the frame that is on at the segment's position; backwards, to the one before that. If the seek
-// gives no stop, the segment ends with the scene. False where the scene has no end, either.
+// To the frame that is on at the segment's position; backwards, to the one before its stop, which
+// is the scene's end where it has none. False where the scene has no end, either.
 static bool locate(Private* priv, GstSegment& segment) {
   const auto rate = guint64(GST_VIDEO_INFO_FPS_N(&priv->info));
   const guint64 second = guint64(GST_VIDEO_INFO_FPS_D(&priv->info)) * GST_SECOND;
   const gint64 length = priv->scene->length();
+  segment.duration = length > 0 ? duration_of(priv->info, length) : GST_CLOCK_TIME_NONE;
   priv->step = segment.rate < 0 ? -1 : 1;
   priv->first_index = 0;
   priv->first_time = 0;
@@ -369,17 +370,19 @@ static bool locate(Private* priv, GstSegment& segment) {
   }
   if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) {
     if (length == 0) return false;
-    segment.stop = segment.position = time_of(priv, length);
-    segment.offset = 0;
+    segment.stop = segment.duration;
   }
-  priv->index = gint64(gst_util_uint64_scale_ceil(segment.position, rate, second)) - 1;
+  // The base class stays where it is if a seek does not name the stop.
+  segment.position = segment.stop;
+  segment.offset = 0;
+  priv->index = gint64(gst_util_uint64_scale_ceil(segment.stop, rate, second)) - 1;
   if (length > 0) priv->index = MIN(priv->index, length - 1);
   return true;
 }
 
-// True for a seek from the end of a scene that has none, and for one backwards there, where the
-// seek gives no end. do_seek would refuse it, too, but that is too late: the base class has flushed
-// by then, and sends no segment.
+// True for a seek from the end of a scene that has none, or whose frame rate is not known yet, and
+// for one backwards where there is no end. do_seek would refuse it, too, but that is too late: the
+// base class has flushed by then, and sends no segment.
 static bool refuses(GstQdmdSceneSrc* self, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK) return false;
   gdouble rate;
@@ -387,14 +390,22 @@ static bool refuses(GstQdmdSceneSrc* self, GstEvent* event) {
   gint64 stop;
   gst_event_parse_seek(event, &rate, nullptr, nullptr, &start_type, nullptr, &stop_type, &stop);
   GST_OBJECT_LOCK(self);
-  const bool endless =
-      GST_VIDEO_INFO_FPS_N(&self->priv->told_info) > 0 && self->priv->told_length == 0;
+  const bool known = GST_VIDEO_INFO_FPS_N(&self->priv->told_info) > 0;
+  const bool endless = known && self->priv->told_length == 0;
   const bool stays = stop_type == GST_SEEK_TYPE_NONE;
   const bool ends = stays ? GST_CLOCK_TIME_IS_VALID(self->priv->told_stop)
                           : stop_type == GST_SEEK_TYPE_SET && stop >= 0;
   GST_OBJECT_UNLOCK(self);
-  const bool from_end = start_type == GST_SEEK_TYPE_END || stop_type == GST_SEEK_TYPE_END;
-  if (!endless || (!from_end && (rate >= 0 || ends))) return false;
+  // Forwards, many programs name the end itself as the stop: that is no stop.
+  const bool from_end = start_type == GST_SEEK_TYPE_END ||
+                        (stop_type == GST_SEEK_TYPE_END && (stop != 0 || rate < 0));
+  if (from_end && (!known || endless)) {
+    GST_WARNING_OBJECT(self,
+                       "A seek from the end needs one: give the scene a length, and seek once "
+                       "the element is paused.");
+    return true;
+  }
+  if (!endless || rate >= 0 || ends) return false;
   GST_WARNING_OBJECT(self, "%s", kNoEnd);
   return true;
 }
@@ -452,7 +463,7 @@ static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
     GST_OBJECT_LOCK(self);
     if (priv->pending) *segment = *priv->pending, priv->told_stop = segment->stop;
     // What seeks from the end go by.
-    segment->duration = length > 0 ? time_of(priv, length) : GST_CLOCK_TIME_NONE;
+    segment->duration = length > 0 ? duration_of(info, length) : GST_CLOCK_TIME_NONE;
     priv->told_info = info;
     priv->told_length = length;
     GST_OBJECT_UNLOCK(self);

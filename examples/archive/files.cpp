@@ -36,6 +36,8 @@ void give_name(const std::string& path) {
   synchronize(folder, O_RDONLY | O_DIRECTORY);
 }
 
+std::string progress_of(const std::string& path) { return path + ".progress"; }
+
 std::optional<Progress> read_progress(const std::string& path) {
   std::ifstream file(path);
   if (!file) return std::nullopt;

@@ -11,6 +11,8 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "examples/archive/picture_file.h"
+
 namespace qdmd::archive {
 namespace {
 
@@ -39,21 +41,6 @@ std::string fraction_of(double rate) {
   int numerator = 0, denominator = 1;
   gst_util_double_to_fraction(rate, &numerator, &denominator);
   return std::to_string(numerator) + "/" + std::to_string(denominator);
-}
-
-// Decoders fill up what a JPEG lacks and say nothing. In a whole one, the last start of scan comes
-// before the end of image.
-bool is_cut_jpeg(const std::string& bytes) {
-  if (!bytes.starts_with("\xFF\xD8")) return false;
-  const size_t end = bytes.rfind("\xFF\xD9"), scan = bytes.rfind("\xFF\xDA");
-  return end == std::string::npos || scan == std::string::npos || end < scan;
-}
-
-// GStreamer 1.22 mixes up the colours of such a PNG.
-bool has_deep_colours(const std::string& bytes) {
-  constexpr size_t kDepth = 24, kKind = 25;  // of the chunk IHDR, which comes first
-  return bytes.starts_with("\x89PNG") && bytes.size() > kKind && bytes[kDepth] == 16 &&
-         bytes[kKind] != 0;
 }
 
 // The pictures of a folder: those of the first kind that there is.
@@ -151,10 +138,8 @@ FrameReader::~FrameReader() {
 // The next file, or all pictures.
 void FrameReader::open() {
   const std::string end =
-      " ! videocrop name=crop ! videoconvert ! video/x-raw,format=BGRx ! appsink "
-      "name=sink "
-      "sync=false "
-      "max-buffers=2";
+      " ! videocrop name=crop ! videoconvert ! video/x-raw,format=BGRx ! "
+      "appsink name=sink sync=false max-buffers=2";
   if (pictures_) {
     const std::string type = media_type_of(files_.front());
     pipeline_ = make_pipeline("appsrc name=source format=time caps=" + type +
@@ -188,7 +173,7 @@ bool FrameReader::feed() {
   std::ifstream file(files_[next_file_], std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
   if (bytes.empty()) throw std::runtime_error(files_[next_file_] + " is empty, or cannot be read");
-  if (is_cut_jpeg(bytes)) throw std::runtime_error(files_[next_file_] + " is cut off");
+  if (is_cut_off(bytes)) throw std::runtime_error(files_[next_file_] + " is cut off");
   if (has_deep_colours(bytes))
     throw std::runtime_error(files_[next_file_] +
                              " has colours of 16 bits, which are not read: convert it to 8 bits");

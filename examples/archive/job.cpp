@@ -62,10 +62,10 @@ std::string settings_of(const JobOptions& options) {
 // That somebody can write there; nobody wants to hear it at the end.
 void check_report(const std::string& path) {
   if (path.empty() || path == "-") return;
-  const std::string temporary = temporary_of(path);
-  if (fs::is_directory(path) || !std::ofstream(temporary))
+  // A pipe may have no reader yet.
+  const bool is_other = fs::exists(path) && !fs::is_regular_file(path) && !fs::is_directory(path);
+  if (!is_other && !std::ofstream(path, std::ios::app))
     throw std::runtime_error(path + " cannot be written");
-  fs::remove(temporary);
 }
 
 class Job {
@@ -76,7 +76,7 @@ class Job {
         reader_(options.recordings, options.rate,
                 [this](const RecordingInfo& info) { return choose(info); }),
         line_(options.quiet || !writes()) {
-    progress_path_ = options.wanted.front().path + ".progress";
+    progress_path_ = progress_of(options.wanted.front().path);
     engine_options_ = options.engine;
     engine_options_.team = team;
     engine_options_.remembers = false;
@@ -395,8 +395,10 @@ class Job {
       std::printf("%s\n", json.dump(1).c_str());
       return;
     }
-    std::ofstream(temporary_of(options_.report)) << json.dump(1) << '\n';
-    give_name(options_.report);
+    std::ofstream file(options_.report);
+    file << json.dump(1) << '\n';
+    if (!file.flush())
+      throw std::runtime_error(options_.report + " cannot be written: is the disk full?");
   }
 
   const JobOptions& options_;

@@ -37,6 +37,10 @@ const char* option_of(Output output) {
   return "--cutout";
 }
 
+bool is_one_name(const fs::path& a, const fs::path& b) {
+  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
+}
+
 bool is_same(const fs::path& a, const fs::path& b) {
   std::error_code error;
   return fs::equivalent(a, b, error);
@@ -45,25 +49,52 @@ bool is_same(const fs::path& a, const fs::path& b) {
 // True for picture_of(path, window) with a window above 0.
 bool is_later_picture(const fs::path& name, const fs::path& path) {
   const std::string stem = name.stem().string(), first = path.stem().string() + "-";
-  return name.extension() == path.extension() && stem.starts_with(first) &&
-         stem.find_first_not_of("0123456789", first.size()) == std::string::npos;
+  if (name.extension() != path.extension() || !stem.starts_with(first)) return false;
+  const std::string number = stem.substr(first.size());
+  return number.find_first_not_of("0123456789") == std::string::npos && !number.empty() &&
+         number.front() != '0' && number != "1";
 }
 
-void check_not_read(const std::string& path, bool is_picture,
-                    const std::vector<std::string>& recordings) {
-  const fs::path beside = fs::absolute(path).parent_path();
-  for (const fs::path recording : recordings) {
+fs::path beside(const fs::path& path) {
+  return fs::absolute(path).lexically_normal().parent_path();
+}
+
+// All that a job writes or removes, as far as it is there.
+std::vector<fs::path> files_of_job(const std::vector<Wanted>& wanted, const std::string& report) {
+  std::vector<fs::path> all;
+  if (!report.empty() && report != "-") all.emplace_back(report);
+  for (const Wanted& one : wanted) {
+    for (const std::string& path : {one.path, progress_of(one.path)}) {
+      all.emplace_back(path);
+      all.emplace_back(temporary_of(path));
+    }
     std::error_code error;
-    if (is_picture && fs::is_directory(recording, error) && is_same(recording, beside))
-      throw std::invalid_argument(path +
-                                  " is in the folder of pictures that is read: give it "
-                                  "another folder");
-    const bool later = is_picture && is_later_picture(recording, path) &&
-                       is_same(fs::absolute(recording).parent_path(), beside);
-    if (later || is_same(recording, path))
-      throw std::invalid_argument(path + " would replace " + recording.string() +
-                                  ", which is read: give it another name");
+    for (fs::directory_iterator entry(beside(one.path), error), end;
+         one.is_picture() && !error && entry != end; entry.increment(error))
+      if (is_later_picture(entry->path().filename(), one.path)) all.push_back(entry->path());
   }
+  return all;
+}
+
+// Throws std::runtime_error: machines may have other files.
+void check_not_read(const std::vector<Wanted>& wanted, const std::string& report,
+                    const std::vector<std::string>& recordings) {
+  for (const fs::path& path : files_of_job(wanted, report))
+    for (const fs::path recording : recordings) {
+      const bool is_picture =
+          path.extension() == ".png" || path.extension() == ".jpg" || path.extension() == ".jpeg";
+      std::error_code error;
+      if (is_same(recording, path) ||
+          (fs::is_directory(recording, error) && is_same(recording, beside(path)) &&
+           (is_picture || fs::exists(path, error))))
+        throw std::runtime_error(path.string() +
+                                 " would be among what is read: give the results another folder");
+    }
+  for (const Wanted& one : wanted)
+    for (const fs::path recording : recordings)
+      if (is_same(folder_of(one.path), beside(recording)))
+        throw std::runtime_error(recording.string() + " is in the folder of " + one.path +
+                                 "'s parts, which are removed: move it first");
 }
 
 }  // namespace
@@ -84,13 +115,12 @@ void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::stri
       throw std::invalid_argument(one.path +
                                   " ends in neither .mkv (a video) nor .png (a picture)");
     for (const Wanted& other : wanted)
-      if (&other != &one && fs::absolute(other.path) == fs::absolute(path))
+      if (&other != &one && is_one_name(other.path, one.path))
         throw std::invalid_argument(one.path + " is named twice");
-    check_not_read(one.path, one.is_picture(), recordings);
-    if (!report.empty() && fs::absolute(report) == fs::absolute(path))
+    if (!report.empty() && is_one_name(report, one.path))
       throw std::invalid_argument(report + " is named twice");
   }
-  if (!report.empty() && report != "-") check_not_read(report, false, recordings);
+  check_not_read(wanted, report, recordings);
 }
 
 Outputs::Outputs(std::vector<Wanted> wanted, int width, int height, double rate,

@@ -22,9 +22,9 @@ struct Wanted {
   bool is_picture() const;
 };
 
-// Throws std::invalid_argument with a sentence for the user: also where a file that is read, or one
-// of a folder of pictures that is, would be replaced by what is wanted or by `report` (a file's
-// name, or "-" or empty).
+// Throws std::invalid_argument with a sentence for the user, and std::runtime_error where what is
+// read would be replaced, removed or added to by what is wanted or by `report` (a file's name, or
+// "-", or empty).
 void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::string>& recordings,
                   const std::string& report);
 

@@ -50,6 +50,8 @@ def run(folder, processes, *words, expect=0):
     text = done.stdout + done.stderr
     if expect == 0:
         assert done.returncode == 0, f'exit status {done.returncode}\n{text}'
+    elif processes == 0:
+        assert done.returncode == expect, f'exit status {done.returncode}\n{text}'
     else:
         assert done.returncode != 0, f'it ended well\n{text}'
     return text
@@ -396,20 +398,38 @@ def what_is_read_stays(folder):
     clip = folder / 'mine.mkv'
     make_clip(clip, 12)
     (folder / 'link.mkv').symlink_to(clip)
-    before = {path: path.read_bytes() for path in (clip, *shots.iterdir())}
+    parts = folder / 'n.mkv.parts'
+    parts.mkdir()
+    part, temporary = parts / '00000001.mkv', folder / 't.mkv.tmp'
+    for copy in (part, temporary):
+        shutil.copy(clip, copy)
+    shutil.copy(shots / '01.png', folder / 'later-2.png')
+    (folder / 'later.lnk.png').symlink_to(folder / 'later-2.png')
+    read = (clip, part, temporary, folder / 'later-2.png', *shots.iterdir())
+    before = {path: path.read_bytes() for path in read}
     inside = shots / 'b.png'
     for words in ([clip, '--mask', clip], [clip, '--background', folder / 'link.mkv'],
                   [clip, '--mask', 'shots/../mine.mkv'], [shots, '--background', shots / '00.png'],
                   [shots, '--background', inside], [clip, '--mask', 'm.mkv', '--report', clip],
-                  [shots / '01.png', '--background', shots / '01.png']):
-        text = run(folder, 0, *words, '--window', 4, expect=2)
-        assert 'is read' in text, f'{words}: {text}'
-    shutil.copy(shots / '01.png', folder / 'later-2.png')
-    text = run(folder, 0, folder / 'later-2.png', '--background', 'later.png', expect=2)
-    assert 'later-2.png, which is read' in text, text
-    assert {path: path.read_bytes() for path in (clip, *shots.iterdir())} == before
-    text = run(folder, 0, clip, '--mask', 'm.mkv', '--report', 'm.mkv', expect=2)
+                  [shots / '01.png', '--background', shots / '01.png'],
+                  [shots, '--background', 'b.png', '--report', shots / '00.png'],
+                  [temporary, '--mask', 't.mkv'], [folder / 'later-2.png', '--background', 'later.png'],
+                  [folder / 'later.lnk.png', '--background', 'later.png']):
+        for processes in (0, 2):
+            text = run(folder, processes, *words, '--window', 4, expect=1)
+            assert 'would be among what is read' in text, f'{words}: {text}'
+    text = run(folder, 0, part, '--mask', 'n.mkv', expect=1)
+    assert 'move it first' in text, text
+    assert {path: path.read_bytes() for path in read} == before
+    text = run(folder, 0, clip, '--mask', 'm.mkv', '--report', './m.mkv', expect=2)
     assert 'twice' in text, text
+    # Names that only look alike.
+    run(folder, 0, shots / '01.png', '--background', '01.png', '--quiet')
+    # A report goes where somebody waits for it.
+    os.mkfifo(folder / 'pipe')
+    reader = subprocess.Popen(['cat', folder / 'pipe'], stdout=subprocess.PIPE, text=True)
+    run(folder, 0, clip, '--background', 'p.png', '--report', 'pipe', '--quiet')
+    assert json.loads(reader.communicate(timeout=60)[0])['frames'] == 12
 
 
 def write_deep_png(path, level, size=40):
@@ -441,11 +461,15 @@ def pictures_that_are_odd(folder):
         for processes in (0, 2):
             text = run(folder, processes, made, '--background', 'n.png', expect=1)
             assert f'03.{kind} is empty' in text, text
-    cut = pictures_of(folder, 'cut', 'jpg')
-    whole = (cut / '03.jpg').read_bytes()
-    (cut / '03.jpg').write_bytes(whole[:len(whole) // 2])
-    text = run(folder, 0, cut, '--background', 'n.png', expect=1)
-    assert '03.jpg is cut off' in text, text
+    for kind in ('png', 'jpg'):
+        cut = pictures_of(folder, 'cut-' + kind, kind)
+        last = cut / f'05.{kind}'
+        whole = last.read_bytes()
+        last.write_bytes(whole + b'what \xff\xd8\xff\xda a camera adds')
+        run(folder, 0, cut, '--background', 'n.png', '--window', 4, '--quiet')
+        last.write_bytes(whole[:len(whole) // 2])
+        text = run(folder, 0, cut, '--background', 'n.png', expect=1)
+        assert f'05.{kind} is cut off' in text, text
 
 
 def a_recording_that_is_cut_off(folder):
@@ -462,13 +486,17 @@ def a_recording_that_is_cut_off(folder):
 def errors(folder):
     clip = folder / 'clip.mkv'
     for words, reason in (
-            ([clip, '--mask', 'm.mkv', '--absorb-time', 'nan'], 'finite'),
             ([clip, '--mask', 'm.mkv', '--report', 'no/folder/r.json'], 'r.json cannot'),
+            ([clip, '--mask', 'no/folder/mask.mkv'], 'no/folder')):
+        for processes in (0, 2):
+            text = run(folder, processes, *words, expect=1)
+            assert reason in text, f'{words}: {text}'
+    for words, reason in (
+            ([clip, '--mask', 'm.mkv', '--absorb-time', 'nan'], 'finite'),
             ([clip], 'nothing is to be written'),
             ([clip, '--mask', 'mask.png'], '.mkv'),
             ([clip, '--mask', 'mask.avi'], '.mkv'),
             ([clip, '--mask', 'one.mkv', '--foreground', 'one.mkv'], 'twice'),
-            ([clip, '--mask', 'no/folder/mask.mkv'], 'no/folder'),
             ([clip, '--background', 'b.png', '--method', 'magic'], '--method'),
             ([clip, '--background', 'b.png', '--window', 1], '--window'),
             ([folder, '--background', 'b.png', '--window', 1], '--window'),

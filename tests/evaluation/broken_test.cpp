@@ -92,7 +92,8 @@ TEST(Broken, TruthAndMasksAreLeftOut) {
     EXPECT_TRUE(result.says("text: truth left out, cannot read gt/GT_text.png")) << result.err;
     EXPECT_TRUE(result.says("labels: masks left out, gt/masks/gt000002.png: label 100"))
         << result.err;
-    EXPECT_TRUE(result.says("numbers: masks left out: none of them has the number of a frame"))
+    EXPECT_TRUE(
+        result.says("numbers: masks left out: none of them has the number of a frame that counts"))
         << result.err;
     EXPECT_TRUE(result.says("region: temporalROI.txt left out: it has not")) << result.err;
     EXPECT_TRUE(result.says("region: masks left out, two sizes: gt/ROI.bmp has 48x37"))

@@ -6,6 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "examples/archive/picture_file.h"
+
 namespace qdmd::evaluation {
 
 namespace fs = std::filesystem;
@@ -16,18 +18,9 @@ std::string size_text(const cv::Mat& picture) {
   return std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
 }
 
-// Decoders fill up what a JPEG lacks with grey and say nothing. In a whole one the end-of-image
-// marker FF D9 comes after the last start of scan FF DA; neither occurs in coded samples.
-bool is_cut_jpeg(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!bytes.starts_with("\xFF\xD8")) return false;
-  const size_t end = bytes.rfind("\xFF\xD9"), scan = bytes.rfind("\xFF\xDA");
-  return end == std::string::npos || scan == std::string::npos || end < scan;
-}
-
 cv::Mat read_picture(const fs::path& path, int flags, const fs::path& folder) {
-  if (is_cut_jpeg(path))
+  std::ifstream file(path, std::ios::binary);
+  if (archive::is_cut_off(std::string{std::istreambuf_iterator<char>(file), {}}))
     throw std::runtime_error("cannot read " + fs::relative(path, folder).string() +
                              ", which is cut off");
   cv::Mat picture;
@@ -132,6 +125,14 @@ LabelledClip read_clip(const Sequence& sequence, const Selection& selection) {
   } catch (const std::runtime_error& error) {
     clip.problems.push_back(std::string("masks left out, ") + error.what());
   }
+  return clip;
+}
+
+LabelledClip read_scored_clip(const Sequence& sequence) {
+  LabelledClip clip = read_clip(sequence, {});
+  if (clip.labels.empty())
+    throw std::runtime_error(sequence.name + ": " +
+                             (clip.problems.empty() ? "no mask counts" : clip.problems.back()));
   return clip;
 }
 

@@ -38,6 +38,9 @@ struct LabelledClip {
 // than the first one, and where the selection has no frame.
 LabelledClip read_clip(const Sequence& sequence, const Selection& selection);
 
+// The whole sequence; throws std::runtime_error, too, where no mask of it counts.
+LabelledClip read_scored_clip(const Sequence& sequence);
+
 // An 8-bit BGR picture of OpenCV for the core.
 ImageView view_of(const cv::Mat& bgr);
 MutableImageView view_of(cv::Mat& bgr);

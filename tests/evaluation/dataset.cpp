@@ -135,10 +135,12 @@ Sequence read_sequence(const fs::path& folder, const std::string& name) {
   const bool any_mask = std::any_of(
       sequence.frames.begin(), sequence.frames.end(), [&sequence](const fs::path& frame) {
         uint64_t number = 0;
-        return frame_number(frame, &number) && sequence.masks.contains(number);
+        return frame_number(frame, &number) && sequence.masks.contains(number) &&
+               number >= sequence.first_scored && number <= sequence.last_scored;
       });
   if (!sequence.frames.empty() && !sequence.masks.empty() && !any_mask)
-    sequence.problems.push_back("masks left out: none of them has the number of a frame");
+    sequence.problems.push_back(
+        "masks left out: none of them has the number of a frame that counts");
   // CDnet has masks and no background pictures: nothing is missing there.
   if (truths.empty() && sequence.masks.empty())
     sequence.problems.push_back(

@@ -184,7 +184,7 @@ int main(int argc, char** argv) try {
     for (const Sequence& sequence : find_sequences(dataset)) {
       if (sequence.masks.empty()) continue;
       std::fprintf(stderr, "\r%-60s", sequence.name.c_str());
-      const auto found = scores(read_clip(sequence, {}), sets, &pool);
+      const auto found = scores(read_scored_clip(sequence), sets, &pool);
       for (size_t i = 0; i < sets.size(); ++i) sums[i] += found[i];
       ++count;
     }

@@ -180,7 +180,7 @@ int main(int argc, char** argv) try {
   }
   std::vector<std::vector<double>> scores(chosen.size());
   for (size_t s = 0; s < sequences.size(); ++s) {
-    const LabelledClip clip = read_clip(sequences[s], {});
+    const LabelledClip clip = read_scored_clip(sequences[s]);
     for (size_t v = 0; v < chosen.size(); ++v) {
       std::fprintf(stderr, "\r%zu of %zu sequences, %-50s", s + 1, sequences.size(),
                    chosen[v].name.c_str());

@@ -144,8 +144,29 @@ TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
                                   -gint64(GST_SECOND), GST_SEEK_TYPE_NONE, -1));
   }
   EXPECT_EQ(flushes, 0);
+  // What programs send that mean no stop.
+  EXPECT_TRUE(gst_element_seek(pipeline.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                               GST_SEEK_TYPE_SET, gint64(GST_SECOND), GST_SEEK_TYPE_END, 0));
+  EXPECT_EQ(flushes, 1);
+  flushes = 0;
   EXPECT_TRUE(seek_backwards(pipeline.get(), GST_SEEK_TYPE_SET, GST_SECOND));
   EXPECT_EQ(flushes, 1);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+// Before the frame rate is known, nothing can be counted from the end.
+TEST(SceneAnswers, FromTheEndOfWhatIsNotKnownIsRefused) {
+  const Element pipeline = pipeline_of("qdmdscenesrc name=source scene=length=9" +
+                                       std::string(kCaps));
+  ASSERT_TRUE(pipeline);
+  const Element source(gst_bin_get_by_name(GST_BIN(pipeline.get()), "source"));
+  gst_element_set_state(pipeline.get(), GST_STATE_READY);
+  const auto seek = [&source](GstSeekType start_type, gint64 start) {
+    return gst_element_seek(source.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, start_type, start,
+                            GST_SEEK_TYPE_NONE, -1);
+  };
+  EXPECT_FALSE(seek(GST_SEEK_TYPE_END, -gint64(GST_SECOND)));
+  EXPECT_TRUE(seek(GST_SEEK_TYPE_SET, 0));
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 
