@@ -156,14 +156,14 @@ TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
 
 // Before the frame rate is known, nothing can be counted from the end.
 TEST(SceneAnswers, FromTheEndOfWhatIsNotKnownIsRefused) {
-  const Element pipeline = pipeline_of("qdmdscenesrc name=source scene=length=9" +
-                                       std::string(kCaps));
+  const Element pipeline =
+      pipeline_of("qdmdscenesrc name=source scene=length=9" + std::string(kCaps));
   ASSERT_TRUE(pipeline);
   const Element source(gst_bin_get_by_name(GST_BIN(pipeline.get()), "source"));
   gst_element_set_state(pipeline.get(), GST_STATE_READY);
   const auto seek = [&source](GstSeekType start_type, gint64 start) {
-    return gst_element_seek(source.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, start_type, start,
-                            GST_SEEK_TYPE_NONE, -1);
+    return gst_element_seek(source.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, start_type,
+                            start, GST_SEEK_TYPE_NONE, -1);
   };
   EXPECT_FALSE(seek(GST_SEEK_TYPE_END, -gint64(GST_SECOND)));
   EXPECT_TRUE(seek(GST_SEEK_TYPE_SET, 0));
