@@ -355,6 +355,7 @@ TEST(SceneSource, PlaysASegmentForwardsAndBackwards) {
 TEST(SceneSource, SeeksKnowTheEndOfTheScene) {
   constexpr auto kSet = GST_SEEK_TYPE_SET, kEnd = GST_SEEK_TYPE_END, kNone = GST_SEEK_TYPE_NONE;
   struct Seek {
+    int times;      // one after another: from the second on, the first one's stop is the segment's
     bool in_ready;  // before caps are known
     double rate;
     GstSeekType start_type;
@@ -364,8 +365,9 @@ TEST(SceneSource, SeeksKnowTheEndOfTheScene) {
     size_t first, count;
   };
   for (const Seek& seek :
-       {Seek{false, -1, kSet, 0, kNone, 0, 11, 12}, Seek{true, -1, kSet, 0, kNone, 0, 11, 12},
-        Seek{false, 1, kSet, 0, kEnd, -5, 0, 7}, Seek{false, 1, kEnd, -3, kNone, 0, 9, 3}}) {
+       {Seek{1, false, -1, kSet, 0, kNone, 0, 11, 12},
+        Seek{2, false, -1, kSet, 0, kNone, 0, 11, 12}, Seek{1, true, -1, kSet, 0, kNone, 0, 11, 12},
+        Seek{1, false, 1, kSet, 0, kEnd, -5, 0, 7}, Seek{2, false, 1, kEnd, -3, kNone, 0, 9, 3}}) {
     Pipeline pipeline(std::string("qdmdscenesrc name=source scene=length=12 ! video/x-raw,") +
                       kSmall);
     if (seek.in_ready)
@@ -373,8 +375,7 @@ TEST(SceneSource, SeeksKnowTheEndOfTheScene) {
     else
       ASSERT_TRUE(pipeline.pause());
     GstElement* source = gst_bin_get_by_name(GST_BIN(pipeline.get()), "source");
-    // Twice: the second time, the first one's stop is the segment's.
-    for (int time = 0; time < 2; ++time)
+    for (int time = 0; time < seek.times; ++time)
       EXPECT_TRUE(gst_element_seek(source, seek.rate, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
                                    seek.start_type, seek.start * gint64(kFrame), seek.stop_type,
                                    seek.stop_type == kNone ? -1 : seek.stop * gint64(kFrame)));
