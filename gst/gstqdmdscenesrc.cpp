@@ -461,7 +461,10 @@ static gboolean gst_qdmd_scene_src_set_caps(GstBaseSrc* source, GstCaps* caps) {
     GstSegment* const segment = &source->segment;
     const gint64 length = priv->scene->length();
     GST_OBJECT_LOCK(self);
-    if (priv->pending) *segment = *priv->pending, priv->told_stop = segment->stop;
+    if (priv->pending) {
+      *segment = *priv->pending;
+      priv->told_stop = segment->stop;
+    }
     // What seeks from the end go by.
     segment->duration = length > 0 ? duration_of(info, length) : GST_CLOCK_TIME_NONE;
     priv->told_info = info;

@@ -424,7 +424,10 @@ void run_job(const JobOptions& options, MpiTeam* team) {
   check_wanted(options.wanted, options.recordings, options.report);
   for (double number : {options.engine.dmd.omega_threshold, options.engine.foreground_threshold,
                         options.absorb_time, options.rate})
-    if (!std::isfinite(number)) throw std::invalid_argument("an option is not a finite number");
+    if (!std::isfinite(number))
+      throw std::invalid_argument(
+          "--omega-threshold, --foreground-threshold, --absorb-time and --framerate are finite "
+          "numbers");
   Job(options, team).run();
 }
 

@@ -383,12 +383,12 @@ def failing_process(folder):
     assert 'missing.mkv' in said, said
 
 
-def pictures_of(folder, name, kind='png', pixels='RGB', frames=6):
+def pictures_of(folder, name, kind='png'):
     made = folder / name
     made.mkdir()
     encoder = {'png': 'pngenc', 'jpg': 'jpegenc'}[kind]
-    common.play(f'videotestsrc pattern=ball num-buffers={frames} ! '
-                f'video/x-raw,width=48,height=36,format={pixels} ! {encoder} ! '
+    common.play(f'videotestsrc pattern=ball num-buffers=6 ! '
+                f'video/x-raw,width=48,height=36,format=RGB ! {encoder} ! '
                 f'multifilesink location="{made}/%02d.{kind}"').set_state(Gst.State.NULL)
     return made
 
@@ -413,7 +413,8 @@ def what_is_read_stays(folder):
                   [shots, '--background', inside], [clip, '--mask', 'm.mkv', '--report', clip],
                   [shots / '01.png', '--background', shots / '01.png'],
                   [shots, '--background', 'b.png', '--report', shots / '00.png'],
-                  [temporary, '--mask', 't.mkv'], [folder / 'later-2.png', '--background', 'later.png'],
+                  [temporary, '--mask', 't.mkv'],
+                  [folder / 'later-2.png', '--background', 'later.png'],
                   [folder / 'later.lnk.png', '--background', 'later.png']):
         for processes in (0, 2):
             text = run(folder, processes, *words, '--window', 4, expect=1)
@@ -432,13 +433,13 @@ def what_is_read_stays(folder):
     assert json.loads(reader.communicate(timeout=60)[0])['frames'] == 12
 
 
-def write_deep_png(path, level, size=40):
-    """A picture of 16 bits a sample, which no element of ours writes."""
+def write_deep_png(path, size=40):
+    """A picture of 16 bits a sample, which pngenc does not write."""
     def chunk(name, data):
         return (struct.pack('>I', len(data)) + name + data
                 + struct.pack('>I', zlib.crc32(name + data)))
 
-    row = b'\0' + struct.pack('>3H', level, 2 * level, 100) * size
+    row = b'\0' + struct.pack('>3H', 12850, 25700, 100) * size
     path.write_bytes(b'\x89PNG\r\n\x1a\n'
                      + chunk(b'IHDR', struct.pack('>2I5B', size, size, 16, 2, 0, 0, 0))
                      + chunk(b'IDAT', zlib.compress(row * size)) + chunk(b'IEND', b''))
@@ -446,7 +447,7 @@ def write_deep_png(path, level, size=40):
 
 def pictures_that_are_odd(folder):
     (folder / 'deep').mkdir()
-    write_deep_png(folder / 'deep' / '1.png', 50 * 257)
+    write_deep_png(folder / 'deep' / '1.png')
     text = run(folder, 0, folder / 'deep', '--background', 'n.png', expect=1)
     assert 'convert it to 8 bits' in text, text
     # A name that is no text.

@@ -52,8 +52,8 @@ constexpr Thinning thinning_of(Models models) {
 
 // One of so many frames that a solve looks at may be remembered, for so many windows.
 constexpr int kRememberedStep = 4, kRememberedWindows = 64;
-// Of the frames that are remembered, windows that overlap still have a part: there it is one of so
-// many of all.
+// Frames between those that a solve looks at are not remembered. Windows that overlap still have a
+// part of what is remembered, and need more of it: there all frames count.
 int remembered_stride(Models models, int window_size) {
   return models == Models::two_of_live ? 1 : thinning_of(models).stride_of(window_size);
 }
