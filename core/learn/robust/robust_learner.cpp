@@ -27,7 +27,7 @@ constexpr size_t kFewestSamples = 28;
 // do, in half of the time. Fewer than `least` snapshots tell less. Windows that overlap see most
 // frames again: every third one is enough there. A window of kLong frames and more is for the best
 // background that there is.
-constexpr int kLong = 200;
+constexpr int kLong = 120;
 struct Thinning {
   int least, most_stride;
 
@@ -62,6 +62,17 @@ int remembered_stride(Models models, int window_size) {
 // more than a tenth of them by two. Noise and clouds stay below that; a background of which parts
 // are still hidden does not.
 constexpr float kCalmMean = 3, kCalmCell = 6, kMostMoved = 0.1f;
+
+// Levels, of each spread in steps of 1/4 level.
+using Limits = std::array<uint8_t, 256>;
+
+Limits limits_of_spreads(int spreads, int least) {
+  Limits limits;
+  for (int wide = 0; wide < 256; ++wide)
+    limits[static_cast<size_t>(wide)] =
+        static_cast<uint8_t>(std::clamp((spreads * wide + 3) / 4, least, 255));
+  return limits;
+}
 
 // Of frames that are one frame apart, from one of frames that are `stride` apart.
 void divide_time(int stride, DmdSummary* summary) {
@@ -357,14 +368,11 @@ void RobustLearner::start(const SnapshotRange& snapshots) {
   median_picture(grid_, band_, stable_, pictures, room_.pool, background, spread.data());
   recall_spread(&spread);
   blur(spread.data(), reference_.width, reference_.height, room_.pool, spread_.data());
-  // Of each spread, in steps of 1/4 level.
-  std::array<uint8_t, 256> threshold, reach;
-  for (int wide = 0; wide < 256; ++wide) {
-    const auto at = static_cast<size_t>(wide);
-    threshold[at] = static_cast<uint8_t>(
-        std::clamp((parameters_.spreads * wide + 3) / 4, parameters_.least_threshold, 255));
-    reach[at] = static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
-  }
+  const Limits threshold = limits_of_spreads(parameters_.spreads, parameters_.least_threshold);
+  Limits reach;
+  for (int wide = 0; wide < 256; ++wide)
+    reach[static_cast<size_t>(wide)] =
+        static_cast<uint8_t>(std::max((wide + 4) / 8, parameters_.least_reach));
   in_runs([&](size_t first, size_t size) {
     for (size_t p = first; p < first + size; ++p) {
       reference_.threshold[p] = threshold[spread_[p]];
@@ -591,7 +599,11 @@ void RobustLearner::end(BackgroundModel* model) {
                   start_frames_, fresh_);
   model->set_gains(gains_of_frames());
   keep_some();
-  std::copy(reference_.threshold.begin(), reference_.threshold.end(), model->make_limits());
+  const Limits limit = limits_of_spreads(parameters_.limit_spreads, parameters_.least_limit);
+  uint8_t* const limits = model->make_limits();
+  in_runs([&](size_t first, size_t size) {
+    for (size_t p = first; p < first + size; ++p) limits[p] = limit[spread_[p]];
+  });
 }
 
 }  // namespace qdmd

@@ -27,10 +27,14 @@ struct RobustParameters {
   int cells_along = kCellsAlong;  // of the grid, along the short side
   // Frames that the start compares, at most: more cost time and say little new.
   int start_frames = 160;
-  // A pixel is foreground above least_threshold, and above so many spreads of the frames that show
-  // its background.
-  int least_threshold = 12;
-  int spreads = 4;
+  // A solve takes out what is above least_threshold, and above so many spreads of the frames that
+  // show the pixel's background. What differs by less is mostly a shadow or a change of light, and
+  // the mean of such samples is nearer to the background than what few frames show.
+  int least_threshold = 28;
+  int spreads = 3;
+  // Masks that users see have other limits: there, what differs a little may be somebody.
+  int least_limit = 12;
+  int limit_spreads = 4;
   // Samples within half a spread of the background, at least so many levels, count in full.
   int least_reach = 2;
   // What an earlier window's background counts at most, in start frames of this one; 0: windows
