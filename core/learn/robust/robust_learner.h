@@ -30,7 +30,7 @@ struct RobustParameters {
   // A solve takes out what is above least_threshold, and above so many spreads of the frames that
   // show the pixel's background. What differs by less is mostly a shadow or a change of light, and
   // the mean of such samples is nearer to the background than what few frames show.
-  int least_threshold = 28;
+  int least_threshold = 26;
   int spreads = 3;
   // Masks that users see have other limits: there, what differs a little may be somebody.
   int least_limit = 12;
