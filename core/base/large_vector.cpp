@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
@@ -12,8 +13,6 @@
 
 namespace qdmd {
 namespace {
-
-constexpr size_t kLargePage = size_t{2} << 20;
 
 // Large pages begin at multiples of their size.
 std::align_val_t alignment_of(size_t bytes) {
@@ -63,6 +62,18 @@ void* take_large(size_t bytes) {
   void* const data = ::operator new(bytes, alignment_of(bytes));
   ask(data, bytes, true);
   return data;
+}
+
+void take_pages(void* data, size_t bytes) noexcept {
+#ifdef MADV_POPULATE_WRITE
+  // Systems that do not know it take pages when they are written.
+  static const auto page = static_cast<uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto first = reinterpret_cast<uintptr_t>(data) / page * page;
+  const auto end = (reinterpret_cast<uintptr_t>(data) + bytes + page - 1) / page * page;
+  if (bytes > 0) madvise(reinterpret_cast<void*>(first), end - first, MADV_POPULATE_WRITE);
+#else
+  (void)data, (void)bytes;
+#endif
 }
 
 void give_back_large(void* data, size_t bytes) noexcept {

@@ -9,14 +9,18 @@
 
 namespace qdmd {
 
-constexpr size_t kLargeAlignment = 64;
-// Memory of so many bytes, which begins at a multiple of kLargeAlignment. From 2 MiB on, the system
-// is asked to give it in pages as large as that, if that is a size that it has: pages of 4 KiB each
-// cost a visit to the kernel when they are touched for the first time, which can take longer than
-// all that is done with them. Memory that nobody touches is not taken, except for what a large page
-// has of it. Throws std::bad_alloc.
+constexpr size_t kLargeAlignment = 64, kLargePage = size_t{2} << 20;
+// Memory of so many bytes, which begins at a multiple of kLargeAlignment. From kLargePage on, the
+// system is asked to give it in pages as large as that, if that is a size that it has: pages of 4
+// KiB each cost a visit to the kernel when they are touched for the first time, which can take
+// longer than all that is done with them. Memory that nobody touches is not taken, except for what
+// a large page has of it. Throws std::bad_alloc.
 void* take_large(size_t bytes);
 void give_back_large(void* data, size_t bytes) noexcept;
+// Takes the pages of memory of take_large() that is going to be written, as far as the system can
+// do that. What is written there stays. If the host of a virtual machine finds new memory slowly,
+// threads that take some pages each wait at once.
+void take_pages(void* data, size_t bytes) noexcept;
 // For a std::unique_ptr to it.
 struct GiveBackLarge {
   size_t bytes = 0;

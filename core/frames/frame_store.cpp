@@ -107,10 +107,11 @@ uint64_t FrameStore::bytes() const {
 }
 
 bool FrameStore::append(const ImageView& frame, Pool* pool) {
-  const int slot = planes_.append();
+  const int slot = planes_.append(pool);
   ++frames_taken_;
   poses_[static_cast<size_t>(slot)] = {};
   if (low_bits_ > 0) {
+    low_.take_pages(slot, pool);
     low_.pad(slot);
     take_deep_planes(slot, frame);
     if (!take_deep_alpha(slot, frame)) return false;

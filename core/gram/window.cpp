@@ -1,5 +1,6 @@
 #include "core/gram/window.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -31,6 +32,21 @@ PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples)
       reserved_(bytes(capacity, pixels, chroma_samples)),
       data_(static_cast<uint8_t*>(take_large(reserved_)), GiveBackLarge{reserved_}) {}
 
+void PlaneSlots::take_pages(int slot, Pool* pool) {
+  const uint64_t end = offset(slot + 1, 0);
+  if (!pool || end <= taken_ || reserved_ < kLargePage) return;
+  // As many for each thread, of machines with few.
+  const uint64_t together = std::min<uint64_t>(pool->threads(), 4);
+  const uint64_t needed = (end - taken_ + kLargePage - 1) / kLargePage;
+  const uint64_t pages = (needed + together - 1) / together * together;
+  pool->run(static_cast<size_t>(pages), [&](size_t page) {
+    const uint64_t first = taken_ + page * kLargePage;
+    if (first < reserved_)
+      qdmd::take_pages(data_.get() + first, std::min<uint64_t>(kLargePage, reserved_ - first));
+  });
+  taken_ = std::min(taken_ + pages * kLargePage, reserved_);
+}
+
 void PlaneSlots::pad(int slot) {
   std::memset(plane(slot, 0) + pixels_, 0, plane_size_ - pixels_);
   for (int c = 1; c < kChannels; ++c)
@@ -49,12 +65,13 @@ Window Window::unshared() const {
   return window;
 }
 
-int Window::append() {
+int Window::append(Pool* pool) {
   if (size_ == capacity()) {
     oldest_ = (oldest_ + 1) % capacity();
     --size_;
   }
   const int newest = slot(size_++);
+  take_pages(newest, pool);
   pad(newest);
   return newest;
 }

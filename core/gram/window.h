@@ -7,6 +7,7 @@
 
 #include "core/base/channels.h"
 #include "core/base/large_vector.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
@@ -68,6 +69,9 @@ class PlaneSlots {
     const uint8_t* const planes[] = {plane(slot, 0), plane(slot, 1), plane(slot, 2)};
     return {planes, shape_};
   }
+  // Takes the memory of slots up to this one on all threads of the pool, and no more than four
+  // large pages beyond it. Null, or never called: pages are taken as they are written.
+  void take_pages(int slot, Pool* pool);
   // Zeros behind the samples of a slot's planes, whose first ones, as many as a plane has, the
   // caller fills.
   void pad(int slot);
@@ -87,7 +91,7 @@ class PlaneSlots {
   int capacity_ = 0;
   size_t pixels_ = 0, plane_size_ = 0, chroma_samples_ = 0, chroma_size_ = 0;
   ChromaShape shape_;
-  uint64_t reserved_ = 0;
+  uint64_t reserved_ = 0, taken_ = 0;
   std::unique_ptr<uint8_t[], GiveBackLarge> data_;
 };
 
@@ -105,8 +109,8 @@ class Window : public PlaneSlots {
   int newest_slot() const { return slot(size_ - 1); }
 
   // Makes room for the newest snapshot, dropping the oldest of a full window, and returns its slot.
-  // The caller fills the three planes' first pixels() samples.
-  int append();
+  // The caller fills the three planes' first pixels() samples. pool: takes new memory; may be null.
+  int append(Pool* pool = nullptr);
   // The same snapshots in the same slots, where each pixel has its own samples: the caller fills
   // them. Throws std::bad_alloc.
   Window unshared() const;

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -17,8 +19,6 @@
 
 namespace qdmd::test {
 namespace {
-
-constexpr size_t kLargePage = size_t{2} << 20;
 
 uintptr_t address_of(const void* at) { return reinterpret_cast<uintptr_t>(at); }
 
@@ -109,6 +109,62 @@ TEST(LargeVector, HoldsWhatItIsTold) {
   const LargeVector<float> moved = std::move(levels);
   EXPECT_EQ(moved.data(), data);
   EXPECT_EQ(LargeVector<float>(moved), moved);
+}
+
+// Pages of the memory that are there; nothing where the system does not tell.
+size_t pages_there(const uint8_t* data, size_t bytes) {
+  const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  std::vector<unsigned char> there((bytes + page - 1) / page);
+  auto* const first = const_cast<uint8_t*>(data);
+  if (mincore(first, bytes, there.data()) != 0) return 0;
+  return static_cast<size_t>(std::count_if(there.begin(), there.end(),
+                                           [](unsigned char flags) { return (flags & 1) != 0; }));
+}
+
+// The system may know no such thing; then nothing happens.
+bool takes_pages() {
+  const auto data = LargeVector<uint8_t>(3 * kLargePage);
+  auto* const bytes = const_cast<uint8_t*>(data.data());
+  take_pages(bytes, 2 * kLargePage);
+  return pages_there(bytes, 2 * kLargePage) * static_cast<size_t>(sysconf(_SC_PAGESIZE)) ==
+         2 * kLargePage;
+}
+
+TEST(TakePages, LeavesWhatIsWritten) {
+  LargeVector<uint8_t> bytes(3 * kLargePage, 7);
+  // Whole pages or not, of any address.
+  take_pages(bytes.data(), bytes.size());
+  take_pages(bytes.data() + 5, kLargePage);
+  take_pages(bytes.data() + 4095, 1);
+  take_pages(bytes.data(), 0);
+  EXPECT_TRUE(std::all_of(bytes.begin(), bytes.end(), [](uint8_t byte) { return byte == 7; }));
+}
+
+// A short stream in a long window takes what it fills, and a few large pages more.
+TEST(TakePages, TakesSlotsAsTheyCome) {
+  if (!takes_pages()) GTEST_SKIP() << "the system takes no pages before they are written";
+  constexpr size_t kPixels = 500000;  // three planes are no whole number of large pages
+  constexpr int kSlots = 40;
+  const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  for (int threads : {1, 2, 3, 8}) {
+    Pool pool(threads);
+    PlaneSlots slots(kSlots, kPixels);
+    const uint8_t* const begin = slots.plane(0, 0);
+    for (int slot = 0; slot < kSlots; ++slot) {
+      slots.take_pages(slot, &pool);
+      slots.take_pages(slot, nullptr);
+      const size_t filled = static_cast<size_t>(slots.plane(slot, 2) - begin) + kPixels;
+      EXPECT_EQ(pages_there(begin, filled), (filled + page - 1) / page) << slot;
+      EXPECT_LE(pages_there(begin, slots.bytes()) * page, filled + 5 * kLargePage) << slot;
+      std::fill_n(slots.plane(slot, 0), kPixels, static_cast<uint8_t>(slot));
+      std::fill_n(slots.plane(slot, 2), kPixels, static_cast<uint8_t>(slot));
+    }
+    for (int slot = 0; slot < kSlots; ++slot) {
+      slots.take_pages(slot, &pool);
+      EXPECT_EQ(slots.plane(slot, 0)[kPixels - 1], slot);
+      EXPECT_EQ(slots.plane(slot, 2)[0], slot);
+    }
+  }
 }
 
 // All that can fail says so in one way.

@@ -68,6 +68,7 @@ void FrameMemory::keep(int64_t number, const SnapshotRange& snapshots, int index
     kept_.erase(kept_.begin() + static_cast<ptrdiff_t>(least_missed(number)));
   if (planes_.shape().is_shared() && !snapshots.shape().is_shared()) unshare();
   const int free = free_slot();
+  planes_.take_pages(free, pool);
   constexpr size_t kParts = 4;  // of a plane
   pool->run(kChannels * kParts, [&](size_t part) {
     const int c = static_cast<int>(part / kParts);
