@@ -52,7 +52,7 @@ std::vector<Variant> variants() {
   vary("start frames", inner(&RobustParameters::start_frames), {40, 80, 300});
   vary("cells along the short side", inner(&RobustParameters::cells_along), {24, 96});
   vary("least threshold", inner(&RobustParameters::least_threshold), {12, 18, 34});
-  vary("threshold in spreads", inner(&RobustParameters::spreads), {2, 4, 6});
+  vary("threshold in spreads", inner(&RobustParameters::spreads), {2, 3, 6});
   return all;
 }
 

@@ -599,7 +599,7 @@ void RobustLearner::end(BackgroundModel* model) {
                   start_frames_, fresh_);
   model->set_gains(gains_of_frames());
   keep_some();
-  const Limits limit = limits_of_spreads(parameters_.limit_spreads, parameters_.least_limit);
+  const Limits limit = limits_of_spreads(parameters_.spreads, parameters_.least_limit);
   uint8_t* const limits = model->make_limits();
   in_runs([&](size_t first, size_t size) {
     for (size_t p = first; p < first + size; ++p) limits[p] = limit[spread_[p]];

@@ -31,10 +31,9 @@ struct RobustParameters {
   // show the pixel's background. What differs by less is mostly a shadow or a change of light, and
   // the mean of such samples is nearer to the background than what few frames show.
   int least_threshold = 26;
-  int spreads = 3;
-  // Masks that users see have other limits: there, what differs a little may be somebody.
+  int spreads = 4;
+  // The same of masks that users see: there, what differs a little may be somebody.
   int least_limit = 12;
-  int limit_spreads = 4;
   // Samples within half a spread of the background, at least so many levels, count in full.
   int least_reach = 2;
   // What an earlier window's background counts at most, in start frames of this one; 0: windows
