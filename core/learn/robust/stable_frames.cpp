@@ -21,7 +21,7 @@ constexpr int kProposals = 64;
 
 // A frame shows the background where its patch is as near to the background's as kNear times the
 // nearest twentieth, or as half the distance at which patches are alike.
-constexpr float kNear = 4;
+constexpr float kNear = 3.5f;
 constexpr double kNearest = 0.05;
 
 // Frames propose themselves for the regions where they differ from the background: what has the
