@@ -461,13 +461,15 @@ TEST(RobustEngine, HardCasesPass) {
         EXPECT_EQ(pictures.size(), clip.size());
         // Of a few pixels noise alone makes the mode decay (plain Q-DMD's does, too).
         if (pixels < 16) continue;
-        // A live model is taken beyond its window: one of frames that differ in their light goes on
-        // with the change.
-        if (mode == Mode::live && (hard.name == "black first frame" ||
-                                   hard.name == "eigenvalue 0" || hard.name == "Jordan pair"))
+        // A live model is taken beyond its window: one of two frames that differ in their light
+        // goes on with the change.
+        if (mode == Mode::live && (hard.name == "black first frame" || hard.name == "eigenvalue 0"))
           continue;
-        // A background is nowhere outside of what its frames were in, but for a change of light.
-        EXPECT_LE(excursion(pictures, clip), 3)
+        // A background is nowhere outside of what its frames were in, but for a change of light. A
+        // ramp goes on in live mode, by no more than what a frame adds.
+        constexpr int kRampStep = 15;
+        EXPECT_LE(excursion(pictures, clip),
+                  mode == Mode::live && hard.name == "Jordan pair" ? kRampStep : 3)
             << "height " << height << ", rank " << rank << ", iterations " << iterations
             << (mode == Mode::live ? ", live" : "");
       }
