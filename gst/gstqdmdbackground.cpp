@@ -72,6 +72,12 @@ class BackgroundState : public qdmd::State {
       flow = gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(trans_), picture.buffer.release());
     return flow;
   }
+  void forward(qdmd::EventPtr event) override {
+    gst_pad_push_event(GST_BASE_TRANSFORM_SRC_PAD(trans_), event.release());
+  }
+  void keep(qdmd::EventPtr event) override {
+    gst_pad_store_sticky_event(GST_BASE_TRANSFORM_SRC_PAD(trans_), event.get());
+  }
 
  private:
   GstBaseTransform* trans_;
@@ -146,6 +152,7 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
     if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);
   }
   qdmd::before_event(GST_ELEMENT(trans), event);
+  if (qdmd::hold_event(GST_ELEMENT(trans), event)) return TRUE;
   return GST_BASE_TRANSFORM_CLASS(parent_class)->sink_event(trans, event);
 }
 

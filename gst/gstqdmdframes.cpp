@@ -75,6 +75,9 @@ static bool with_engine(GstElement* self, Action action) {
 static void forget_frames(GstElement* self) {
   State* state = state_of(self);
   state->shells.clear();
+  // What is true of the stream stays true.
+  while (EventPtr event = state->shells.next_event())
+    if (GST_EVENT_IS_STICKY(event.get())) state->keep(std::move(event));
   GST_OBJECT_LOCK(self);
   state->latency.restart();
   GST_OBJECT_UNLOCK(self);
@@ -255,9 +258,22 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
   }
 }
 
+void send_events(GstElement* self) {
+  State* state = state_of(self);
+  while (EventPtr event = state->shells.next_event()) state->forward(std::move(event));
+}
+
+bool hold_event(GstElement* self, GstEvent* event) {
+  if (!GST_EVENT_IS_SERIALIZED(event) || GST_EVENT_TYPE(event) == GST_EVENT_CAPS) return false;
+  // Where downstream refused the last frame, nobody has come for them.
+  send_events(self);
+  return state_of(self)->shells.hold(event);
+}
+
 GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
   State* state = state_of(self);
   pictures->clear();
+  send_events(self);
   if (!state->engine.ready()) return GST_FLOW_OK;
 
   const BufferPtr shell = state->shells.pop();
@@ -335,6 +351,7 @@ GstFlowReturn drain(GstElement* self) {
     flow = next_pictures(self, &pictures);
     if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }
+  send_events(self);
   GST_OBJECT_LOCK(self);
   state->latency.restart();
   GST_OBJECT_UNLOCK(self);

@@ -18,8 +18,13 @@ void drop_frames(GstElement* self);
 GstFlowReturn prepare_for(GstElement* self, GstBuffer* input);
 // Takes a frame of the negotiated caps.
 GstFlowReturn take_frame(GstElement* self, BufferPtr buffer);
-// The pictures that are wanted of the next ready frame, which has left then; none with OK where
-// none is ready.
+// Takes an event that is about to be forwarded, and keeps it behind the frames that wait. False: it
+// is the caller's to forward now. Caps always are.
+bool hold_event(GstElement* self, GstEvent* event);
+// Forwards events that were held behind frames which have left.
+void send_events(GstElement* self);
+// Does that, and then makes the pictures that are wanted of the next ready frame, which has left by
+// then; none with OK where none is ready.
 GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures);
 // Solves for what is left and pushes it; the next frame begins a new window.
 GstFlowReturn drain(GstElement* self);

@@ -163,6 +163,13 @@ class SeparateState : public qdmd::State {
     goes_on_ = some || none;
     return flow;
   }
+  void forward(qdmd::EventPtr event) override {
+    sync();
+    gst_pad_event_default(sink, GST_OBJECT(self_), event.release());
+  }
+  void keep(qdmd::EventPtr event) override {
+    each([&](GstQdmdOutlet* outlet) { gst_pad_store_sticky_event(GST_PAD(outlet), event.get()); });
+  }
   // What one pad met is not the others' affair. And where nobody listens, nobody misses a frame.
   bool goes_on(GstFlowReturn) const override { return goes_on_; }
 
@@ -225,6 +232,7 @@ static GstFlowReturn gst_qdmd_separate_chain(GstPad*, GstObject* parent, GstBuff
     flow = qdmd::next_pictures(self, &pictures);
     if (flow == GST_FLOW_OK) flow = state->send(&pictures);
   }
+  qdmd::send_events(self);
   return flow;
 }
 
@@ -290,6 +298,7 @@ static gboolean gst_qdmd_separate_sink_event(GstPad* pad, GstObject* parent, Gst
     default:
       break;
   }
+  if (qdmd::hold_event(self, event)) return TRUE;
   state->sync();
   return gst_pad_event_default(pad, parent, event);
 }

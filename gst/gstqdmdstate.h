@@ -16,6 +16,7 @@
 #include "gst/latency.h"
 #include "gst/pointers.h"
 #include "gst/solvereport.h"
+#include "gst/waitingframes.h"
 
 namespace qdmd {
 
@@ -67,6 +68,10 @@ class State {
                                       OutputPictures* pictures) = 0;
   // Pushes what is drawn.
   virtual GstFlowReturn send(OutputPictures* pictures) = 0;
+  // Forwards an event that was held back.
+  virtual void forward(EventPtr event) = 0;
+  // Source pads have this event from now on, although nobody was sent it: a sticky one.
+  virtual void keep(EventPtr event) = 0;
   // Somebody takes frames after send() had this flow.
   virtual bool goes_on(GstFlowReturn flow) const { return flow == GST_FLOW_OK; }
 
@@ -90,9 +95,9 @@ class State {
   // Protected by the stream lock.
   const GstSegment* const segment;  // of what comes in
   GstVideoInfo info = {};           // of the video that the engine is configured for
-  // The metadata of the frames that the engine holds, oldest first: buffers without memory, so that
-  // upstream's pools never wait for a window.
-  BufferQueue shells;
+  // The metadata of the frames that the engine holds: buffers without memory, so that upstream's
+  // pools never wait for a window.
+  WaitingFrames shells;
   std::vector<guint8> mask, residual;  // for regions
   RegionFinder regions;
   guint64 solves_told = 0, scenes_told = 0, views_told = 0;  // of the engine's

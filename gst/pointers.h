@@ -3,10 +3,7 @@
 
 #include <gst/gst.h>
 
-#include <cstddef>
 #include <memory>
-#include <utility>
-#include <vector>
 
 namespace qdmd {
 
@@ -35,38 +32,9 @@ struct FreeChars {
 };
 using CharsPtr = std::unique_ptr<gchar, FreeChars>;
 
-// Buffers in the order in which they came: a ring.
-class BufferQueue {
- public:
-  bool empty() const { return size_ == 0; }
-  size_t size() const { return size_; }
-  // 0: the oldest.
-  GstBuffer* at(size_t index) const { return ring_[(first_ + index) % ring_.size()].get(); }
-  // Room for `count` buffers in all. Throws std::bad_alloc, as push() does beyond that.
-  void reserve(size_t count) {
-    if (count <= ring_.size()) return;
-    std::vector<BufferPtr> ring(count);
-    for (size_t i = 0; i < size_; ++i) ring[i] = std::move(ring_[(first_ + i) % ring_.size()]);
-    ring_ = std::move(ring);
-    first_ = 0;
-  }
-  void push(BufferPtr buffer) {
-    if (size_ == ring_.size()) reserve(2 * size_ + 1);
-    ring_[(first_ + size_++) % ring_.size()] = std::move(buffer);
-  }
-  BufferPtr pop() {
-    BufferPtr buffer = std::move(ring_[first_]);
-    first_ = (first_ + 1) % ring_.size();
-    --size_;
-    return buffer;
-  }
-  void clear() {
-    while (!empty()) pop();
-  }
-
- private:
-  std::vector<BufferPtr> ring_;
-  size_t first_ = 0, size_ = 0;
+struct UnrefEvent {
+  void operator()(GstEvent* event) const { gst_event_unref(event); }
 };
+using EventPtr = std::unique_ptr<GstEvent, UnrefEvent>;
 
 }  // namespace qdmd

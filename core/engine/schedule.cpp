@@ -1,5 +1,7 @@
 #include "core/engine/schedule.h"
 
+#include <utility>
+
 namespace qdmd {
 namespace {
 
@@ -14,8 +16,7 @@ bool Schedule::take(const ImageView& frame) {
   Stabilizer* const stabilizer = stage_.stabilizer;
   if (!stabilizer || no_room_) return true;
   const IgnoredAreas& ignored = background().wishes().ignored;
-  if (background().known() && background().solves() != referred_to_ &&
-      (referred_to_ == 0 || stabilizer->frames_since_reference() >= kReferenceFrames)) {
+  if (background().known() && wants_reference(*stabilizer)) {
     referred_to_ = background().solves();
     show_newest();
     stage_.restorer->write_canvas(background().model(), frames().window().pixels(), idle_pool());
@@ -30,6 +31,16 @@ bool Schedule::take(const ImageView& frame) {
   }
   if (!stabilizer->canvas_moved().is_rest()) move_canvas(stabilizer->canvas_moved());
   return true;
+}
+
+// A frame that brings a new background costs enough: the one after it takes the reference. Where
+// each frame brings one, it does.
+bool Schedule::wants_reference(const Stabilizer& stabilizer) {
+  const uint64_t solves = background().solves();
+  const bool is_new = std::exchange(solves_before_, solves) != solves;
+  if (solves == referred_to_) return false;
+  const int64_t frames = stabilizer.frames_since_reference();
+  return referred_to_ == 0 || frames >= (is_new ? 2 : 1) * kReferenceFrames;
 }
 
 // Frames before the newest, where they are still looked at and nothing was made of them yet.

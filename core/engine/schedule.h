@@ -120,13 +120,15 @@ class Schedule {
   void hold_up() { held_up_ = true; }
 
  private:
+  bool wants_reference(const Stabilizer& stabilizer);
   void move_canvas(const Pose& to);
   void steady(int index, const Pose& pose, Pool* pool);
 
   Stage stage_;
   bool held_up_ = false, no_room_ = false;
   uint64_t scenes_ = 0;
-  uint64_t referred_to_ = 0;  // the solve that frames are compared with; 0: of none
+  uint64_t referred_to_ = 0;    // the solve that frames are compared with; 0: of none
+  uint64_t solves_before_ = 0;  // with the frame before
 };
 
 }  // namespace qdmd

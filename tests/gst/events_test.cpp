@@ -1,6 +1,9 @@
 // What becomes of a window when an event or a query arrives in its middle: one test a row.
 #include <gst/video/gstvideometa.h>
 
+#include <string>
+#include <utility>
+
 #include "tests/gst/element_test.h"
 
 namespace qdmd::test {
@@ -217,17 +220,128 @@ TEST_F(HalfAWindow, AnotherPlaybackRateBeginsANewOne) {
   expect_new_window(3);
 }
 
-TEST_F(HalfAWindow, TagsAndCustomEventsPassAtOnce) {
-  while (GstEvent* event = gst_harness_try_pull_event(stream_.harness())) gst_event_unref(event);
-  send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "street", nullptr)));
-  send(gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("mine")));
-  expect_frames(0, 0);
-  for (GstEventType type : {GST_EVENT_TAG, GST_EVENT_CUSTOM_DOWNSTREAM}) {
-    GstEvent* event = gst_harness_try_pull_event(stream_.harness());
-    ASSERT_NE(nullptr, event);
-    EXPECT_EQ(type, GST_EVENT_TYPE(event));
-    gst_event_unref(event);
+// What arrives downstream from now on, in order: the numbers of frames, and names of events.
+class Arrivals {
+ public:
+  explicit Arrivals(GstHarness* harness) : pad_(harness->sinkpad) {
+    probe_ = gst_pad_add_probe(
+        pad_, GstPadProbeType(GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+        note, this, nullptr);
   }
+  ~Arrivals() { gst_pad_remove_probe(pad_, probe_); }
+  Arrivals(const Arrivals&) = delete;
+  Arrivals& operator=(const Arrivals&) = delete;
+
+  std::string take() { return std::exchange(text_, ""); }
+
+ private:
+  static GstPadProbeReturn note(GstPad*, GstPadProbeInfo* info, gpointer data) {
+    std::string& text = static_cast<Arrivals*>(data)->text_;
+    if (!text.empty()) text += " ";
+    if (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) {
+      text += std::to_string(GST_BUFFER_PTS(GST_PAD_PROBE_INFO_BUFFER(info)) / kFrame);
+      return GST_PAD_PROBE_OK;
+    }
+    GstEvent* event = GST_PAD_PROBE_INFO_EVENT(info);
+    const GstStructure* own = GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM
+                                  ? gst_event_get_structure(event)
+                                  : nullptr;
+    text += own ? gst_structure_get_name(own) : GST_EVENT_TYPE_NAME(event);
+    return GST_PAD_PROBE_OK;
+  }
+
+  GstPad* pad_;
+  gulong probe_;
+  std::string text_;
+};
+
+GstEvent* tag(const char* title) {
+  return gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, title, nullptr));
+}
+GstEvent* custom(const char* name) {
+  return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name));
+}
+
+TEST_F(HalfAWindow, TagsAndCustomEventsKeepTheirPlace) {
+  Arrivals arrivals(stream_.harness());
+  send(tag("street"));
+  send(custom("one"));
+  stream_.push_many(3, 2);
+  send(custom("two"));
+  stream_.push_many(5, kWindow - 5);
+  EXPECT_EQ("0", arrivals.take());
+  stream_.push_many(kWindow, 4);
+  EXPECT_EQ("1 2 tag one 3 4 two", arrivals.take());
+  send(custom("three"));
+  EXPECT_EQ("", arrivals.take());
+  EXPECT_TRUE(stream_.eos());
+  EXPECT_EQ("5 6 7 8 9 10 11 three eos", arrivals.take());
+}
+
+// There is nothing that they could overtake.
+TEST_F(HalfAWindow, EventsPassAtOnceWhereNoFrameWaits) {
+  send(gst_event_new_gap(3 * kFrame, kFrame));
+  Arrivals arrivals(stream_.harness());
+  send(tag("street"));
+  send(custom("one"));
+  EXPECT_EQ("tag one", arrivals.take());
+}
+
+TEST_F(HalfAWindow, EventsOutsideTheStreamPassAtOnce) {
+  Arrivals arrivals(stream_.harness());
+  send(custom("inside"));
+  send(gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM_OOB, gst_structure_new_empty("outside")));
+  EXPECT_EQ("custom-downstream-oob", arrivals.take());
+}
+
+TEST_F(HalfAWindow, EventsComeBeforeWhatEndsIt) {
+  Arrivals arrivals(stream_.harness());
+  send(custom("one"));
+  const GstSegment segment = segment_from(10 * GST_SECOND);
+  send(gst_event_new_segment(&segment));
+  EXPECT_EQ("0 1 2 one segment", arrivals.take());
+}
+
+// Downstream still learns what is true of the stream.
+TEST_F(HalfAWindow, AFlushDropsEventsButForStickyOnes) {
+  Arrivals arrivals(stream_.harness());
+  send(tag("street"));
+  send(custom("one"));
+  send(gst_event_new_flush_start());
+  send(gst_event_new_flush_stop(TRUE));
+  const GstSegment segment = segment_from(0);
+  send(gst_event_new_segment(&segment));
+  arrivals.take();
+  stream_.push_many(3, kWindow);
+  EXPECT_TRUE(stream_.eos());
+  GstEvent* kept = gst_pad_get_sticky_event(stream_.harness()->sinkpad, GST_EVENT_TAG, 0);
+  ASSERT_NE(nullptr, kept);
+  gst_event_unref(kept);
+  EXPECT_EQ(std::string::npos, arrivals.take().find("one"));
+}
+
+// Upstream goes on, although nobody takes frames any more.
+TEST(Events, AreNotHeldWhereDownstreamHasEnded) {
+  Stream stream("qdmdbackground window-size=4", GST_VIDEO_FORMAT_RGB, 40, 24);
+  stream.push_many(0, 3);
+  Arrivals arrivals(stream.harness());
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), custom("one")));
+  GstPad* pad = stream.harness()->sinkpad;
+  const gulong probe = gst_pad_add_probe(
+      pad, GST_PAD_PROBE_TYPE_BUFFER,
+      [](GstPad*, GstPadProbeInfo* info, gpointer) {
+        gst_buffer_unref(GST_PAD_PROBE_INFO_BUFFER(info));
+        GST_PAD_PROBE_INFO_DATA(info) = nullptr;
+        GST_PAD_PROBE_INFO_FLOW_RETURN(info) = GST_FLOW_EOS;
+        return GST_PAD_PROBE_HANDLED;
+      },
+      nullptr, nullptr);
+  EXPECT_EQ(GST_FLOW_EOS, stream.push(3));
+  EXPECT_NE(GST_FLOW_ERROR, stream.push(4));
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_eos()));
+  const std::string text = arrivals.take();
+  EXPECT_NE(std::string::npos, text.find("eos")) << text;
+  gst_pad_remove_probe(pad, probe);
 }
 
 TEST_F(HalfAWindow, ReconfigureLeavesItAsItIs) {

@@ -205,6 +205,27 @@ TEST(Pads, ThatComeLateBeginWithTheStreamsEvents) {
   EXPECT_NE(rig.at("mask").stream_id(), rig.at("background").stream_id());
 }
 
+TEST(Events, WaitWithTheFramesBeforeThem) {
+  Rig rig(std::string("qdmdseparate") + kSmall);
+  rig.listen("background");
+  rig.listen("mask");
+  rig.start(GST_VIDEO_FORMAT_RGB, 16, 16);
+  ASSERT_EQ(GST_FLOW_OK, rig.push(0));
+  rig.send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "title", nullptr)));
+  const std::vector<GstEventType> tag = {GST_EVENT_TAG};
+  size_t out = 0;
+  for (const char* name : {"background", "mask"}) rig.at(name).take_events();
+  for (int t = 1; out == 0; ++t) {
+    ASSERT_LT(t, 100);
+    ASSERT_EQ(GST_FLOW_OK, rig.push(t));
+    out = rig.at("mask").take().size();
+    for (const char* name : {"background", "mask"}) {
+      const auto events = rig.at(name).take_events();
+      EXPECT_EQ(out > 0 ? tag : std::vector<GstEventType>(), events) << name << t;
+    }
+  }
+}
+
 // Requested, and not linked before frames come.
 TEST(Pads, ThatAreLinkedLateBeginWithTheStreamsEvents) {
   Rig rig(std::string("qdmdseparate mode=live") + kSmall);
