@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables and plots of docs/performance.md anew, in less than ten minutes on an idle
+# Puts the tables and plots of docs/performance.md anew, in a quarter of an hour on an idle
 # machine. What the programs print stays in build/performance.
 #
 #   tests/pages/performance.sh [--short | --page]
@@ -48,10 +48,13 @@ if [ "$form" != --page ]; then
   google passes '/(320x240|1920x1080)' --benchmark_min_time="$min_time"
   google gram '^peak|^[^rw].*/m:(60|100|200)/' --benchmark_min_time="$min_time"
   step adjoint.txt "$bench/adjoint" "${adjoint[@]}"
-  step live-1080p.txt "$bench/live" --seconds "$live"
-  step live-320x240.txt "$bench/live" --seconds "$memory" --width 320 --height 240 --unpaced
-  step memory-live.txt "$bench/live" --seconds 10 --unpaced
-  step memory-batch.txt "$bench/live" --seconds 8 --unpaced --mode batch
+  for method in robust qdmd; do
+    of=("$bench/live" --method "$method")
+    step "live-1080p-$method.txt" "${of[@]}" --seconds "$live"
+    step "live-320x240-$method.txt" "${of[@]}" --seconds "$memory" --width 320 --height 240 --unpaced
+    step "memory-live-$method.txt" "${of[@]}" --seconds 10 --unpaced
+    step "memory-batch-$method.txt" "${of[@]}" --seconds 8 --unpaced --mode batch
+  done
   uptime >"$results/load-after"
   echo "== done ($SECONDS s)" >&2
 fi
