@@ -90,21 +90,26 @@ def milliseconds(video, folder, width, height, frames):
             for name, (form, elements) in CASES.items() if elements != 'identity'}
 
 
+RUNS = 5
+
+
 def evenness(live, folder, width, height):
-    """The median frame of mode=live in ms, and how many times that the longest ones take, medians of three runs: of the
-    first ten, of those that fill the window, and of those after."""
+    """The median frame of mode=live in ms, and how many times that the longest ones take, medians of five runs: of the
+    first ten, of those that fill the window, and of those after. Then the same of those after, each in its shortest run:
+    what a frame takes by itself, for what other programs and the host take comes to other frames in each run."""
     times = f'{folder}/live-times.txt'
-    rows = []
-    for run in range(3):
-        print(f'\r{width}x{height}: live, run {run + 1} of 3 ', end='', file=sys.stderr)
+    rows, runs = [], []
+    for run in range(RUNS):
+        print(f'\r{width}x{height}: live, run {run + 1} of {RUNS} ', end='', file=sys.stderr)
         subprocess.run([live, '--unpaced', '--seconds', '24', '--width', str(width), '--height', str(height),
                         '--times', times], check=True, stdout=subprocess.DEVNULL)
         with open(times, encoding='ascii') as file:
             frames = [float(line) for line in file]
         median = statistics.median(frames[200:])
-        longest = [max(part) / median for part in (frames[:10], frames[10:200], frames[200:])]
-        rows.append((median, *longest))
-    return [statistics.median(column) for column in zip(*rows)]
+        rows.append((median, *(max(part) / median for part in (frames[:10], frames[10:200], frames[200:]))))
+        runs.append(frames[200:])
+    shortest = [min(frame) for frame in zip(*runs)]
+    return [*(statistics.median(column) for column in zip(*rows)), max(shortest) / statistics.median(shortest)]
 
 
 if __name__ == '__main__':
@@ -124,7 +129,7 @@ if __name__ == '__main__':
         'speed': page.table(['ms a frame (times as fast as `segmentation`)', *sizes],
                             [row for name, row in rows.items() if CASES[name][0] == 'RGBA']),
         'even': page.table(['frames of `mode=live`', 'median, ms', 'longest of the first 10', 'of the next 190',
-                            'of the 400 after'], even),
+                            'of the 400 after', 'of these, each in its shortest run'], even),
         'speed-formats': page.table(['ms a frame, `output=mask` (times as long as)', *sizes],
                                     [row for name, row in rows.items() if CASES[name][0] != 'RGBA']),
     })
