@@ -271,6 +271,8 @@ void before_event(GstElement* self, GstEvent* event) {
     case GST_EVENT_SEGMENT:
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_GAP:
+    // Nothing more may come for long.
+    case GST_EVENT_STREAM_GROUP_DONE:
     case GST_EVENT_EOS:
       // The flow of these frames is not the event's: EOS goes on whatever they met.
       drain(self);

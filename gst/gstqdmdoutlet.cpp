@@ -211,8 +211,14 @@ void negotiate_outlet(GstQdmdOutlet* outlet, GstCaps* input) {
   gst_pad_mark_reconfigure(pad);
 }
 
+struct Following {
+  GstQdmdOutlet* outlet;
+  const WaitingFrames& waiting;
+};
+
 static gboolean follow_event(GstPad*, GstEvent** event, gpointer data) {
-  GstQdmdOutlet* outlet = GST_QDMD_OUTLET(data);
+  const auto& [outlet, waiting] = *static_cast<const Following*>(data);
+  if (waiting.holds(*event)) return TRUE;
   switch (GST_EVENT_TYPE(*event)) {
     case GST_EVENT_STREAM_START:
       start_stream(outlet, *event);
@@ -232,12 +238,13 @@ static gboolean follow_event(GstPad*, GstEvent** event, gpointer data) {
   return TRUE;
 }
 
-void sync_outlet(GstQdmdOutlet* outlet, GstPad* sink) {
+void sync_outlet(GstQdmdOutlet* outlet, GstPad* sink, const WaitingFrames& waiting) {
   // It would keep nothing.
   if (GST_PAD_IS_FLUSHING(GST_PAD(outlet))) return;
   const bool asked = gst_pad_check_reconfigure(GST_PAD(outlet));
   if (std::exchange(outlet->fresh, FALSE)) {
-    gst_pad_sticky_events_foreach(sink, follow_event, outlet);
+    Following following = {outlet, waiting};
+    gst_pad_sticky_events_foreach(sink, follow_event, &following);
   } else if (asked) {
     outlet->ended = FALSE;
     const CapsPtr caps(gst_pad_get_current_caps(sink));

@@ -5,6 +5,7 @@
 
 #include "core/foreground/foreground.h"
 #include "gst/pointers.h"
+#include "gst/waitingframes.h"
 
 G_BEGIN_DECLS
 
@@ -30,9 +31,9 @@ Output output_of(const GstQdmdOutlet* outlet);
 // What was agreed with downstream is forgotten: the pad's next frame, or event, begins with the
 // events of `sink`.
 void reset_outlet(GstQdmdOutlet* outlet);
-// Before an event or a frame: the sticky events that `sink` has and the pad lacks, and caps, where
-// downstream asked for others.
-void sync_outlet(GstQdmdOutlet* outlet, GstPad* sink);
+// Before an event or a frame: the sticky events that `sink` has and the pad lacks, but for those
+// that wait behind frames; and caps, where downstream asked for others.
+void sync_outlet(GstQdmdOutlet* outlet, GstPad* sink, const WaitingFrames& waiting);
 // Tells downstream of video of these caps.
 void negotiate_outlet(GstQdmdOutlet* outlet, GstCaps* input);
 // `event` of the sink, with an identity of the pad's own.

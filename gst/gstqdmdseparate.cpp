@@ -109,7 +109,7 @@ class SeparateState : public qdmd::State {
       if (const OutletPtr one = outlet(kind)) see(one.get());
   }
   void sync() {
-    each([this](GstQdmdOutlet* outlet) { qdmd::sync_outlet(outlet, sink); });
+    each([this](GstQdmdOutlet* outlet) { qdmd::sync_outlet(outlet, sink, shells); });
   }
   void set_segment(const GstSegment& its) { segment_ = its; }
   void forget_flows() {
@@ -133,7 +133,7 @@ class SeparateState : public qdmd::State {
       Leaving& one = leaving_[kind];
       one = {outlet(kind), GST_FLOW_NOT_LINKED};
       if (!one.outlet) continue;
-      qdmd::sync_outlet(one.outlet.get(), sink);
+      qdmd::sync_outlet(one.outlet.get(), sink, shells);
       qdmd::BufferPtr buffer;
       one.flow = qdmd::take_buffer(one.outlet.get(), shell, &buffer);
       if (one.flow == GST_FLOW_OK)
@@ -290,7 +290,7 @@ static gboolean gst_qdmd_separate_sink_event(GstPad* pad, GstObject* parent, Gst
       state->forget_flows();
       state->each([&](GstQdmdOutlet* outlet) {
         qdmd::reopen_outlet(outlet);
-        qdmd::sync_outlet(outlet, state->sink);
+        qdmd::sync_outlet(outlet, state->sink, state->shells);
         qdmd::start_stream(outlet, event);
       });
       gst_event_unref(event);

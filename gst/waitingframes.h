@@ -3,6 +3,7 @@
 
 #include <gst/gst.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <list>
 #include <new>
@@ -56,6 +57,10 @@ class WaitingFrames {
     }
     events_.back().event.reset(event);
     return true;
+  }
+  bool holds(const GstEvent* event) const {
+    return std::any_of(events_.begin(), events_.end(),
+                       [event](const Held& held) { return held.event.get() == event; });
   }
   // The oldest event before which no frame waits; null: there is none.
   EventPtr next_event() {

@@ -33,14 +33,15 @@ bool Schedule::take(const ImageView& frame) {
   return true;
 }
 
-// A frame that brings a new background costs enough: the one after it takes the reference. Where
-// each frame brings one, it does.
+// A frame that brings a new background costs enough: the one after it takes the reference, even if
+// it brings another one.
 bool Schedule::wants_reference(const Stabilizer& stabilizer) {
   const uint64_t solves = background().solves();
-  const bool is_new = std::exchange(solves_before_, solves) != solves;
+  const bool is_new = std::exchange(solves_before_, solves) != solves,
+             was_new = std::exchange(was_new_, is_new);
   if (solves == referred_to_) return false;
-  const int64_t frames = stabilizer.frames_since_reference();
-  return referred_to_ == 0 || frames >= (is_new ? 2 : 1) * kReferenceFrames;
+  const bool is_time = stabilizer.frames_since_reference() >= kReferenceFrames;
+  return referred_to_ == 0 || (is_time && (!is_new || was_new));
 }
 
 // Frames before the newest, where they are still looked at and nothing was made of them yet.

@@ -129,6 +129,7 @@ class Schedule {
   uint64_t scenes_ = 0;
   uint64_t referred_to_ = 0;    // the solve that frames are compared with; 0: of none
   uint64_t solves_before_ = 0;  // with the frame before
+  bool was_new_ = false;        // the frame before brought a new background
 };
 
 }  // namespace qdmd

@@ -302,6 +302,23 @@ TEST_F(HalfAWindow, EventsComeBeforeWhatEndsIt) {
   EXPECT_EQ("0 1 2 one segment", arrivals.take());
 }
 
+TEST_F(HalfAWindow, EventsComeBeforeOtherCaps) {
+  Arrivals arrivals(stream_.harness());
+  send(custom("one"));
+  stream_.set_caps(GST_VIDEO_FORMAT_RGB, 16, 16);
+  stream_.push_many(3, 1);
+  EXPECT_TRUE(stream_.eos());
+  const std::string text = arrivals.take();
+  EXPECT_EQ(0u, text.find("0 1 2 one caps")) << text;
+}
+
+// Nothing may come after it for a long time, and others wait for it.
+TEST_F(HalfAWindow, TheEndOfAGroupSendsIt) {
+  Arrivals arrivals(stream_.harness());
+  send(gst_event_new_stream_group_done(7));
+  EXPECT_EQ("0 1 2 stream-group-done", arrivals.take());
+}
+
 // Downstream still learns what is true of the stream.
 TEST_F(HalfAWindow, AFlushDropsEventsButForStickyOnes) {
   Arrivals arrivals(stream_.harness());
@@ -311,7 +328,6 @@ TEST_F(HalfAWindow, AFlushDropsEventsButForStickyOnes) {
   send(gst_event_new_flush_stop(TRUE));
   const GstSegment segment = segment_from(0);
   send(gst_event_new_segment(&segment));
-  arrivals.take();
   stream_.push_many(3, kWindow);
   EXPECT_TRUE(stream_.eos());
   GstEvent* kept = gst_pad_get_sticky_event(stream_.harness()->sinkpad, GST_EVENT_TAG, 0);
@@ -325,21 +341,29 @@ TEST(Events, AreNotHeldWhereDownstreamHasEnded) {
   Stream stream("qdmdbackground window-size=4", GST_VIDEO_FORMAT_RGB, 40, 24);
   stream.push_many(0, 3);
   Arrivals arrivals(stream.harness());
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), tag("street")));
   ASSERT_TRUE(gst_harness_push_event(stream.harness(), custom("one")));
   GstPad* pad = stream.harness()->sinkpad;
   const gulong probe = gst_pad_add_probe(
       pad, GST_PAD_PROBE_TYPE_BUFFER,
       [](GstPad*, GstPadProbeInfo* info, gpointer) {
+        if (GST_BUFFER_PTS(GST_PAD_PROBE_INFO_BUFFER(info)) < 2 * kFrame) return GST_PAD_PROBE_OK;
         gst_buffer_unref(GST_PAD_PROBE_INFO_BUFFER(info));
         GST_PAD_PROBE_INFO_DATA(info) = nullptr;
         GST_PAD_PROBE_INFO_FLOW_RETURN(info) = GST_FLOW_EOS;
         return GST_PAD_PROBE_HANDLED;
       },
       nullptr, nullptr);
-  EXPECT_EQ(GST_FLOW_EOS, stream.push(3));
-  EXPECT_NE(GST_FLOW_ERROR, stream.push(4));
+  stream.push_many(3, 2);
+  EXPECT_EQ("0 1", arrivals.take());
+  EXPECT_EQ(GST_FLOW_EOS, stream.push(5));
+  arrivals.take();
+  ASSERT_TRUE(gst_harness_push_event(stream.harness(), custom("two")));
+  EXPECT_EQ("tag one", arrivals.take());
+  // Frames are dropped now, and what belongs between them.
   ASSERT_TRUE(gst_harness_push_event(stream.harness(), gst_event_new_eos()));
   const std::string text = arrivals.take();
+  EXPECT_EQ(std::string::npos, text.find("two")) << text;
   EXPECT_NE(std::string::npos, text.find("eos")) << text;
   gst_pad_remove_probe(pad, probe);
 }

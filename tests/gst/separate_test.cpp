@@ -1,4 +1,5 @@
 // qdmdseparate: pads negotiate, come and go, and end, each by itself, whatever happens to others.
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <random>
@@ -224,6 +225,46 @@ TEST(Events, WaitWithTheFramesBeforeThem) {
       EXPECT_EQ(out > 0 ? tag : std::vector<GstEventType>(), events) << name << t;
     }
   }
+}
+
+TEST(Events, ThatWaitReachAPadThatComesMeanwhileOnce) {
+  Rig rig(std::string("qdmdseparate") + kSmall);
+  rig.listen("background");
+  rig.start(GST_VIDEO_FORMAT_RGB, 16, 16);
+  ASSERT_EQ(GST_FLOW_OK, rig.push(0));
+  for (const char* title : {"one", "two"})
+    rig.send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, title, nullptr)));
+  rig.listen("mask");
+  for (int t = 1; t < 8; ++t) ASSERT_EQ(GST_FLOW_OK, rig.push(t));
+  EXPECT_EQ((std::vector<GstEventType>{GST_EVENT_STREAM_START, GST_EVENT_CAPS, GST_EVENT_SEGMENT,
+                                       GST_EVENT_TAG, GST_EVENT_TAG}),
+            rig.at("mask").take_events());
+}
+
+TEST(Events, OfTheWholeStreamSurviveAFlush) {
+  Rig rig(std::string("qdmdseparate") + kSmall);
+  rig.listen("background");
+  rig.start(GST_VIDEO_FORMAT_RGB, 16, 16);
+  ASSERT_EQ(GST_FLOW_OK, rig.push(0));
+  rig.send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "title", nullptr)));
+  rig.send(gst_event_new_flush_start());
+  rig.send(gst_event_new_flush_stop(TRUE));
+  rig.segment();
+  for (int t = 0; t < 8; ++t) ASSERT_EQ(GST_FLOW_OK, rig.push(t));
+  const auto events = rig.at("background").take_events();
+  EXPECT_EQ(1, std::count(events.begin(), events.end(), GST_EVENT_TAG));
+}
+
+TEST(Events, ThatWaitComeBeforeAnotherStream) {
+  Rig rig(std::string("qdmdseparate") + kSmall);
+  rig.listen("background");
+  rig.start(GST_VIDEO_FORMAT_RGB, 16, 16);
+  ASSERT_EQ(GST_FLOW_OK, rig.push(0));
+  rig.at("background").take_events();
+  rig.send(gst_event_new_tag(gst_tag_list_new(GST_TAG_TITLE, "title", nullptr)));
+  rig.send(gst_event_new_stream_start("another"));
+  EXPECT_EQ((std::vector<GstEventType>{GST_EVENT_TAG, GST_EVENT_STREAM_START}),
+            rig.at("background").take_events());
 }
 
 // Requested, and not linked before frames come.
