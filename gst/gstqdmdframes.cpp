@@ -10,6 +10,7 @@
 #include "gst/gstqdmdareas.h"
 #include "gst/gstqdmdenums.h"
 #include "gst/gstqdmdlearnt.h"
+#include "gst/videoformat.h"
 #include "gst/videoview.h"
 
 GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
@@ -432,11 +433,7 @@ bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& i
   state->info = info;
   state->solves_told = 0;
   EngineOptions options = settings.engine;
-  options.colours = colours_of(info);
-  options.levels = levels_of(info);
-  options.depth = bits_of(info).depth;
-  options.chroma_columns = 1 << GST_VIDEO_FORMAT_INFO_W_SUB(info.finfo, 1);
-  options.chroma_rows = 1 << GST_VIDEO_FORMAT_INFO_H_SUB(info.finfo, 1);
+  set_format(info, &options);
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;

@@ -125,11 +125,6 @@ Problem give(State* state, const Learnt& learnt) {
 
 }  // namespace
 
-Colours colours_of(const GstVideoInfo& info) {
-  if (GST_VIDEO_INFO_IS_YUV(&info)) return Colours::yuv;
-  return GST_VIDEO_INFO_IS_GRAY(&info) ? Colours::grey : Colours::rgb;
-}
-
 bool save_learnt(GstElement* self, const gchar* file) {
   State* state = state_of(self);
   const Problem wrong = guarded([&]() -> Problem {

@@ -17,7 +17,4 @@ bool read_load_location(GstElement* self);
 // an error was posted.
 bool apply_loaded(GstElement* self);
 
-// Which of its backgrounds fit.
-Colours colours_of(const GstVideoInfo& info);
-
 }  // namespace qdmd

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/align/restorer.h"
 #include "core/foreground/decision.h"
@@ -14,8 +15,15 @@
 namespace qdmd {
 namespace {
 
-// The most that may share pictures of this size: each has rows of cells.
-int most_members(int width, int height) { return Grid(width, height).rows; }
+// Rows of the picture where a member's own ones may begin: a row of cells does, and pixels that
+// share a sample stay together.
+std::vector<int> tops_of(const EngineOptions& options, int width, int height) {
+  const Grid grid(width, height);
+  std::vector<int> tops;
+  for (int row = 0; row < grid.rows; ++row)
+    if (grid.top(row) % options.chroma_rows == 0) tops.push_back(grid.top(row));
+  return tops;
+}
 
 // More than the sums of a Gram matrix can hold, or rows that are longer than a pass adds up. Bytes
 // of fewer pixels, in any window, are below 2^63.
@@ -124,13 +132,14 @@ std::string describe(const EngineOptions& options, int width, int height) {
 
 Band band_of(const EngineOptions& options, int width, int height) {
   if (!options.team) return Band(height);
-  const Grid grid(width, height);
-  const int size = options.team->size();
+  const std::vector<int> tops = tops_of(options, width, height);
+  const auto size = static_cast<size_t>(options.team->size());
   std::vector<int> ends;
-  for (int rank = 1; rank <= size; ++rank)
-    ends.push_back(grid.top(static_cast<int>(int64_t{rank} * grid.rows / size)));
+  for (size_t rank = 1; rank < size; ++rank) ends.push_back(tops[rank * tops.size() / size]);
+  ends.push_back(height);
   const int learnt = options.method == Method::robust ? RobustLearner::reach(options) : 0;
-  return Band(options.team, std::move(ends), learnt + Decision::reach(width, height));
+  const int halo = learnt + Decision::reach(width, height), together = options.chroma_rows;
+  return Band(options.team, std::move(ends), (halo + together - 1) / together * together);
 }
 
 namespace {
@@ -153,7 +162,7 @@ Status check_team(const EngineOptions& options, int width, int height) {
     return {Code::invalid_options,
             "solver=qr and solver=adjoint need all pixels in one process: use gram, gram-extended "
             "or auto"};
-  const int most = most_members(width, height);
+  const auto most = static_cast<int>(tops_of(options, width, height).size());
   if (options.team->size() > most)
     return {Code::invalid_options, "frames of " + std::to_string(width) + "x" +
                                        std::to_string(height) + " can be shared by " +

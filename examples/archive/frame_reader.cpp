@@ -43,6 +43,29 @@ std::string fraction_of(double rate) {
   return std::to_string(numerator) + "/" + std::to_string(denominator);
 }
 
+// In what frames like these are kept: all of their colours, as the element takes them.
+GstVideoFormat kept_format(const GstVideoInfo& info) {
+  if (GST_VIDEO_INFO_IS_GRAY(&info)) return GST_VIDEO_FORMAT_GRAY8;
+  if (!GST_VIDEO_INFO_IS_YUV(&info)) return GST_VIDEO_FORMAT_BGRx;
+  if (GST_VIDEO_FORMAT_INFO_W_SUB(info.finfo, 1) != 1) return GST_VIDEO_FORMAT_Y444;
+  return GST_VIDEO_FORMAT_INFO_H_SUB(info.finfo, 1) == 1 ? GST_VIDEO_FORMAT_I420
+                                                         : GST_VIDEO_FORMAT_Y42B;
+}
+
+// Of pictures made of frames like `info`, of that size.
+GstVideoInfo picture_info(const GstVideoInfo& info, int width, int height) {
+  const GstVideoFormat format = kept_format(info);
+  GstVideoInfo picture;
+  gst_video_info_set_format(&picture,
+                            format == GST_VIDEO_FORMAT_BGRx ? GST_VIDEO_FORMAT_RGB : format,
+                            static_cast<guint>(width), static_cast<guint>(height));
+  picture.colorimetry = info.colorimetry;
+  picture.chroma_site = info.chroma_site;
+  picture.par_n = info.par_n;
+  picture.par_d = info.par_d;
+  return picture;
+}
+
 // The pictures of a folder: those of the first kind that there is.
 std::vector<std::string> pictures_of(const fs::path& folder) {
   std::vector<std::string> all;
@@ -64,7 +87,7 @@ std::vector<std::string> pictures_of(const fs::path& folder) {
 struct FrameReader::Crop {
   std::mutex lock;
   std::function<Rows(const RecordingInfo&)> choose;
-  ElementPtr element;
+  ElementPtr element, format;
   RecordingInfo info, first;
   bool known = false;
   Rows wanted, left;
@@ -82,6 +105,10 @@ struct FrameReader::Crop {
     if (!known) {
       first = seen;
       known = true;
+      const CapsPtr kept(gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
+                                             gst_video_format_to_string(kept_format(seen.picture)),
+                                             nullptr));
+      g_object_set(format.get(), "caps", kept.get(), nullptr);
       wanted = choose(seen);
       left.first = std::max(0, wanted.first / kAround * kAround - kAround);
       const int end = (wanted.first + wanted.count + 2 * kAround - 1) / kAround * kAround;
@@ -98,7 +125,9 @@ struct FrameReader::Crop {
     gst_event_parse_caps(event, &caps);
     GstVideoInfo info;
     if (!gst_video_info_from_caps(&info, caps)) return GST_PAD_PROBE_OK;
-    RecordingInfo seen = {GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info), 0};
+    RecordingInfo seen = {
+        GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info), 0,
+        picture_info(info, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info))};
     if (GST_VIDEO_INFO_FPS_N(&info) > 0)
       seen.rate = double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info);
     auto* const crop = static_cast<Crop*>(data);
@@ -130,7 +159,7 @@ FrameReader::FrameReader(std::vector<std::string> paths, double rate,
 }
 
 FrameReader::~FrameReader() {
-  if (mapped_) gst_video_frame_unmap(&frame_);
+  frame_.reset();
   // Its threads look at the crop.
   pipeline_.reset();
 }
@@ -138,7 +167,7 @@ FrameReader::~FrameReader() {
 // The next file, or all pictures.
 void FrameReader::open() {
   const std::string end =
-      " ! videocrop name=crop ! videoconvert ! video/x-raw,format=BGRx ! "
+      " ! videocrop name=crop ! videoconvert ! capsfilter name=format ! "
       "appsink name=sink sync=false max-buffers=2";
   if (pictures_) {
     const std::string type = media_type_of(files_.front());
@@ -153,6 +182,8 @@ void FrameReader::open() {
   {
     const std::lock_guard held(crop_->lock);
     crop_->element = element_of(pipeline_, "crop");
+    crop_->format = element_of(pipeline_, "format");
+    if (format_) g_object_set(crop_->format.get(), "caps", format_.get(), nullptr);
   }
   if (!pictures_) g_object_set(source_.get(), "location", files_[next_file_++].c_str(), nullptr);
   GstPad* const pad = gst_element_get_static_pad(crop_->element.get(), "sink");
@@ -187,8 +218,7 @@ bool FrameReader::feed() {
 }
 
 bool FrameReader::next() {
-  if (mapped_) gst_video_frame_unmap(&frame_);
-  mapped_ = false;
+  frame_.reset();
   sample_.reset();
   for (;;) {
     if (!pipeline_) {
@@ -226,17 +256,13 @@ bool FrameReader::next_of_file() {
 
 void FrameReader::take(SamplePtr sample) {
   sample_ = std::move(sample);
-  {
-    const std::lock_guard held(crop_->lock);
-    if (!known_) info_ = crop_->first;
-    known_ = true;
-  }
-  if (info_.rate <= 0) info_.rate = rate_;
   GstBuffer* const buffer = gst_sample_get_buffer(sample_.get());
-  if (!gst_video_info_from_caps(&frame_info_, gst_sample_get_caps(sample_.get())) ||
-      !gst_video_frame_map(&frame_, &frame_info_, buffer, GST_MAP_READ))
-    throw std::runtime_error("a decoded frame cannot be read");
-  mapped_ = true;
+  const GstCaps* const caps = gst_sample_get_caps(sample_.get());
+  GstVideoInfo info;
+  const bool is_video = gst_video_info_from_caps(&info, caps);
+  if (is_video) frame_.emplace(&info, buffer, GST_MAP_READ);
+  if (!is_video || !*frame_) throw std::runtime_error("a decoded frame cannot be read");
+  if (!known_) know(info, caps);
   const auto length = static_cast<GstClockTime>(std::llround(GST_SECOND / info_.rate));
   const GstSegment* const segment = gst_sample_get_segment(sample_.get());
   const GstClockTime shown =
@@ -249,25 +275,38 @@ void FrameReader::take(SamplePtr sample) {
   end_ = time_ + length;
 }
 
+// The first frame's.
+void FrameReader::know(const GstVideoInfo& frame, const GstCaps* caps) {
+  {
+    const std::lock_guard held(crop_->lock);
+    info_ = crop_->first;
+  }
+  if (info_.rate <= 0) info_.rate = rate_;
+  info_.picture = picture_info(frame, info_.width, info_.height);
+  // What can be converted; the size, which is of a band here, and the rate are the file's.
+  format_.reset(gst_caps_new_empty_simple("video/x-raw"));
+  for (const char* const field : {"format", "colorimetry", "chroma-site"})
+    if (const GValue* const value = gst_structure_get_value(gst_caps_get_structure(caps, 0), field))
+      gst_caps_set_value(format_.get(), field, value);
+  known_ = true;
+}
+
 ImageView FrameReader::view() const {
-  ImageView view;
-  const auto* const plane = static_cast<const uint8_t*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
-  const ptrdiff_t stride = GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, 0);
+  ImageView view = frame_->view<const uint8_t>();
   Rows wanted, left;
   {
     const std::lock_guard held(crop_->lock);
     wanted = crop_->wanted;
     left = crop_->left;
   }
-  const uint8_t* const top = plane + (wanted.first - left.first) * stride;
-  // B, G, R and a byte of nothing.
-  for (int c = 0; c < 3; ++c) view.channel[c] = top + 2 - c;
-  view.alpha = top + 3;
-  view.alpha_is_padding = true;
-  view.width = info_.width;
+  // Pixels that share a sample are wanted together.
+  const auto down = [&](int c) {
+    const Spacing at = view.spacing(c);
+    return (wanted.first - left.first) / at.rows * at.row_stride;
+  };
+  for (int c = 0; c < 3; ++c) view.channel[c] += down(c);
+  if (view.alpha) view.alpha += down(3);
   view.height = wanted.count;
-  view.pixel_stride = 4;
-  view.row_stride = stride;
   return view;
 }
 

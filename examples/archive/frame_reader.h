@@ -5,17 +5,21 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/image_view.h"
 #include "examples/archive/gst_pointers.h"
+#include "gst/videoview.h"
 
 namespace qdmd::archive {
 
 struct RecordingInfo {
   int width = 0, height = 0;  // pixels
   double rate = 0;            // frames a second
+  // Of pictures that are made of its frames: I420, Y42B, Y444, GRAY8 or RGB.
+  GstVideoInfo picture = {};
 };
 
 // Rows of a picture.
@@ -25,7 +29,9 @@ struct Rows {
 
 // Reads files one after another as one recording, or a folder's pictures (PNG or JPEG) in the order
 // of their names. Whatever can be decoded is; other rows than those that are wanted are cropped
-// before colours are converted. Throws std::runtime_error with a sentence for the user.
+// before anything is converted. Frames keep their colours and how many pixels share a sample of
+// them, but have 8 bits and no alpha; if files differ in that, all become like the first. Throws
+// std::runtime_error with a sentence for the user.
 class FrameReader {
  public:
   // choose: which rows are wanted, once the size is known. rate: of pictures.
@@ -35,8 +41,8 @@ class FrameReader {
 
   // The next frame; false at the end.
   bool next();
-  // Of it: the rows that are wanted, RGB, good until the next call; and when it is shown, in
-  // nanoseconds from the first one.
+  // Of it: the rows that are wanted, good until the next call; and when it is shown, in nanoseconds
+  // from the first one.
   ImageView view() const;
   GstClockTime time() const { return time_; }
   // The share of the recording that was read, 0 .. 1, about.
@@ -52,6 +58,7 @@ class FrameReader {
   bool next_of_file();
   void note_early_end();
   void take(SamplePtr sample);
+  void know(const GstVideoInfo& frame, const GstCaps* caps);
 
   std::vector<std::string> files_, early_ends_;
   bool pictures_ = false;
@@ -61,12 +68,12 @@ class FrameReader {
   std::unique_ptr<Crop> crop_;
   PipelinePtr pipeline_;
   ElementPtr source_, sink_;
+  // What later files are converted to.
+  CapsPtr format_;
   RecordingInfo info_;
   bool known_ = false;
   SamplePtr sample_;
-  GstVideoInfo frame_info_ = {};
-  GstVideoFrame frame_ = {};
-  bool mapped_ = false;
+  std::optional<MappedVideoFrame> frame_;
   // Where the file begins, and where its newest frame ends, in time.
   GstClockTime begin_ = 0, end_ = 0, time_ = 0;
 };

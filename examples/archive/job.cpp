@@ -14,7 +14,9 @@
 
 #include "examples/archive/files.h"
 #include "examples/archive/frame_reader.h"
+#include "examples/archive/picture.h"
 #include "examples/archive/progress_line.h"
+#include "gst/videoformat.h"
 
 namespace qdmd::archive {
 namespace {
@@ -22,8 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using Json = nlohmann::ordered_json;
-
-constexpr size_t kSamples = 3;  // R, G, B of pictures that are gathered
 
 // Names of files may have any bytes, and JSON has none but those of a text.
 std::string as_text(const std::string& name) {
@@ -50,7 +50,7 @@ std::string settings_of(const JobOptions& options) {
        << " iterations " << engine.iterations << " foreground-threshold "
        << engine.foreground_threshold << " shadows " << static_cast<int>(options.shadows)
        << " absorb-time " << options.absorb_time << " rate " << options.rate << " encoder "
-       << options.encoder;
+       << options.encoder << " in the recording's colours";
   for (const std::string& path : options.recordings)
     text << " from " << as_text(fs::absolute(path).string());
   for (const Wanted& wanted : options.wanted)
@@ -126,9 +126,11 @@ class Job {
 
   // From the streaming thread, before there is a frame.
   Rows choose(const RecordingInfo& info) {
-    const Status status = check_options(engine_options_, info.width, info.height);
+    EngineOptions options = engine_options_;
+    set_format(info.picture, &options);
+    const Status status = check_options(options, info.width, info.height);
     if (!status.ok()) throw std::invalid_argument(status.message);
-    const Band band = band_of(engine_options_, info.width, info.height);
+    const Band band = band_of(options, info.width, info.height);
     return {band.first(), band.rows()};
   }
 
@@ -153,14 +155,17 @@ class Job {
   void configure() {
     const RecordingInfo& info = reader_.info();
     if (team_) {
-      int64_t first[] = {info.width, info.height};
+      const int64_t own[] = {info.width, info.height, GST_VIDEO_INFO_FORMAT(&info.picture)};
+      int64_t first[] = {own[0], own[1], own[2]};
       team_->tell(first);
-      if (team_->agree(first[0] != info.width || first[1] != info.height) != 0)
-        throw std::runtime_error("processes read frames of different sizes, this one of " +
+      if (team_->agree(!std::equal(own, std::end(own), first)) != 0)
+        throw std::runtime_error("processes read different frames, this one " +
                                  std::to_string(info.width) + "x" + std::to_string(info.height) +
+                                 " in " + GST_VIDEO_INFO_NAME(&info.picture) +
                                  ": do all machines have the same files?");
     }
     engine_options_.frame_rate = 0;
+    set_format(info.picture, &engine_options_);
     const Status status = engine_.configure(engine_options_, info.width, info.height);
     if (!status.ok()) throw std::invalid_argument(status.message);
     if (options_.absorb_time > 0)
@@ -168,14 +173,9 @@ class Job {
           std::clamp(std::round(options_.absorb_time * info.rate), 1.0, 1e12)));
     engine_.set_shadows(options_.shadows);
     engine_.set_masks_expected(wants_masks());
-    const Band& band = engine_.band();
-    const auto row = static_cast<size_t>(info.width);
-    kept_.resize(kSamples * row * static_cast<size_t>(band.rows()));
-    if (writes()) whole_.resize(kSamples * row * static_cast<size_t>(info.height));
-    // A byte a pixel.
-    for (int rank = 0; rank < band.members(); ++rank)
-      ends_.push_back(row * static_cast<size_t>(band.end_of(rank)));
-    outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
+    picture_.emplace(info.picture, engine_.band().rows(), writes());
+    mask_.emplace(mask_info(info.picture), engine_.band().rows(), writes());
+    outputs_.emplace(options_.wanted, info.picture, info.rate, options_.encoder);
     if (!writes()) return;
     // Nobody goes on with what another job had done.
     if (!options_.resume) fs::remove(progress_path_);
@@ -268,16 +268,18 @@ class Job {
       if (wanted.output == Output::mask && options_.shadows != Shadows::marked) {
         const auto start = Clock::now();
         const uint8_t* const mask = engine_.whole_mask();
+        if (writes()) mask_->whole->copy(mask);
         pictures_ += since(start);
-        if (writes()) encode(which, {mask, ends_.back()}, time);
+        if (writes()) encode(which, mask_->whole->all(), time);
         continue;
       }
-      const bool grey = wanted.output == Output::mask;
+      const bool is_mask = wanted.output == Output::mask;
+      Shared& shared = is_mask ? *mask_ : *picture_;
       const auto start = Clock::now();
-      engine_.write(wanted.output, {}, kept_view(grey));
+      engine_.write(wanted.output, is_mask ? Levels() : engine_options_.levels, shared.kept.view());
       pictures_ += since(start);
-      const std::span<const uint8_t> picture = gather(grey);
-      if (writes()) encode(which, picture, time);
+      gather(&shared);
+      if (writes()) encode(which, shared.whole->all(), time);
     }
   }
 
@@ -290,36 +292,43 @@ class Job {
   void write_background() {
     for (size_t which = 0; which < options_.wanted.size(); ++which) {
       if (!options_.wanted[which].is_picture()) continue;
-      engine_.write_background(kept_view(false));
-      const std::span<const uint8_t> picture = gather(false);
+      engine_.write_background(picture_->kept.view());
+      gather(&*picture_);
       if (!writes()) continue;
       const auto start = Clock::now();
-      outputs_->write_picture(which, done_.windows, picture);
+      outputs_->write_picture(which, done_.windows, picture_->whole->all());
       encoding_ += since(start);
     }
   }
 
-  MutableImageView kept_view(bool grey) {
-    MutableImageView view;
-    for (int c = 0; c < kChannels; ++c) view.channel[c] = kept_.data() + (grey ? 0 : c);
-    view.width = reader_.info().width;
-    view.height = engine_.band().rows();
-    view.pixel_stride = grey ? 1 : static_cast<ptrdiff_t>(kSamples);
-    view.row_stride = view.pixel_stride * view.width;
-    return view;
-  }
+  // A picture: the rows that this process keeps; and, at the first process, all of it.
+  struct Shared {
+    Picture kept;
+    std::optional<Picture> whole;
 
-  // The whole picture of which each process has written its own rows; the first process has it.
-  std::span<const uint8_t> gather(bool grey) {
+    Shared(const GstVideoInfo& info, int rows, bool first)
+        : kept(info, GST_VIDEO_INFO_WIDTH(&info), rows) {
+      if (first) whole.emplace(info, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
+    }
+  };
+
+  // Each process has written its own rows.
+  void gather(Shared* shared) {
     const Band& band = engine_.band();
-    const size_t row = (grey ? 1 : kSamples) * static_cast<size_t>(reader_.info().width);
-    const std::span own = std::span(kept_).subspan(row * static_cast<size_t>(band.own_begin()),
-                                                   row * static_cast<size_t>(band.own_rows()));
-    if (!team_) return own;
-    std::vector<size_t> ends = ends_;
-    for (size_t& end : ends) end *= grey ? 1 : kSamples;
-    team_->gather(own, whole_, ends);
-    return std::span(whole_).first(writes() ? ends.back() : 0);
+    const int first = band.own_begin(), end = first + band.own_rows();
+    for (int plane = 0; plane < shared->kept.planes(); ++plane) {
+      const std::span<const uint8_t> own = shared->kept.rows(plane, first, end);
+      std::span<uint8_t> whole;
+      if (writes()) whole = shared->whole->rows(plane, 0, band.height());
+      if (!team_) {
+        std::copy(own.begin(), own.end(), whole.begin());
+        continue;
+      }
+      std::vector<size_t> ends;
+      for (int rank = 0; rank < band.members(); ++rank)
+        ends.push_back(shared->kept.bytes_before(plane, band.end_of(rank)));
+      team_->gather(own, whole, ends);
+    }
   }
 
   // The first process only.
@@ -328,7 +337,7 @@ class Job {
     line_.say("joining the windows' videos");
     if (!outputs_) {
       const RecordingInfo info;
-      outputs_.emplace(options_.wanted, info.width, info.height, info.rate, options_.encoder);
+      outputs_.emplace(options_.wanted, info.picture, info.rate, options_.encoder);
     }
     // Killed before this is known, the job joins all of them once more.
     if (!done_.joined) {
@@ -412,8 +421,7 @@ class Job {
   std::string progress_path_;
   Progress done_;
   int64_t frames_ = 0;
-  std::vector<uint8_t> kept_, whole_;
-  std::vector<size_t> ends_;
+  std::optional<Shared> picture_, mask_;
   Json solves_ = Json::array();
   double reading_ = 0, pushing_ = 0, solving_ = 0, pictures_ = 0, encoding_ = 0;
 };

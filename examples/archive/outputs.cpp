@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "examples/archive/files.h"
+#include "examples/archive/picture.h"
 
 namespace qdmd::archive {
 namespace {
@@ -123,11 +124,11 @@ void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::stri
   check_not_read(wanted, report, recordings);
 }
 
-Outputs::Outputs(std::vector<Wanted> wanted, int width, int height, double rate,
+Outputs::Outputs(std::vector<Wanted> wanted, const GstVideoInfo& picture, double rate,
                  std::string encoder)
     : wanted_(std::move(wanted)),
-      width_(width),
-      height_(height),
+      picture_(picture),
+      mask_(mask_info(picture)),
       rate_(rate),
       encoder_(std::move(encoder)) {}
 
@@ -139,8 +140,8 @@ std::string Outputs::part_of(size_t which, int64_t window) const {
 
 Outputs::Open Outputs::open(size_t which, const std::string& path,
                             const std::string& encoder) const {
-  const VideoShape shape = {width_, height_, rate_, wanted_[which].output == Output::mask};
-  return {path, std::make_unique<VideoWriter>(temporary_of(path), shape, encoder)};
+  const GstVideoInfo& info = wanted_[which].output == Output::mask ? mask_ : picture_;
+  return {path, std::make_unique<VideoWriter>(temporary_of(path), info, rate_, encoder)};
 }
 
 void Outputs::begin_after(int64_t windows) {

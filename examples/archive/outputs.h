@@ -33,7 +33,9 @@ void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::stri
 // its name at once: that of the first window as it was given, others with their number.
 class Outputs {
  public:
-  Outputs(std::vector<Wanted> wanted, int width, int height, double rate, std::string encoder);
+  // picture: of all but masks, which have its size.
+  Outputs(std::vector<Wanted> wanted, const GstVideoInfo& picture, double rate,
+          std::string encoder);
 
   // What earlier jobs left, from window `windows` on, is removed.
   void begin_after(int64_t windows);
@@ -63,7 +65,7 @@ class Outputs {
   Open open(size_t which, const std::string& path, const std::string& encoder) const;
 
   std::vector<Wanted> wanted_;
-  int width_, height_;
+  GstVideoInfo picture_, mask_;
   double rate_;
   std::string encoder_;
   std::map<size_t, Open> files_;

@@ -2,10 +2,8 @@
 
 #include <gst/app/gstappsink.h>
 #include <gst/app/gstappsrc.h>
-#include <gst/video/video.h>
 
 #include <cmath>
-#include <cstring>
 
 namespace qdmd::archive {
 namespace {
@@ -44,42 +42,31 @@ const char* const kLossless = "avenc_ffv1 ! matroskamux";
 // encoder's own level, in two thirds of its time.
 const char* const kPicture = "pngenc snapshot=true compression-level=2";
 
-VideoWriter::VideoWriter(const std::string& path, const VideoShape& shape,
+VideoWriter::VideoWriter(const std::string& path, const GstVideoInfo& info, double rate,
                          const std::string& encoder)
-    : path_(path), shape_(shape) {
+    : path_(path), length_(static_cast<GstClockTime>(std::llround(GST_SECOND / rate))) {
   // Of all that the lossless encoder takes, what loses nothing of this.
+  const GstVideoFormat format = GST_VIDEO_INFO_FORMAT(&info);
   const std::string kept =
-      shape.grey ? "video/x-raw,format=GRAY8 ! " : "video/x-raw,format=BGRx ! ";
-  pipeline_ =
-      make_pipeline(std::string(kSource) + "videoconvert ! " + (encoder == kLossless ? kept : "") +
-                    encoder + " ! filesink name=sink async=false");
+      gst_video_format_to_string(format == GST_VIDEO_FORMAT_RGB ? GST_VIDEO_FORMAT_BGRx : format);
+  pipeline_ = make_pipeline(std::string(kSource) + "videoconvert ! " +
+                            (encoder == kLossless ? "video/x-raw,format=" + kept + " ! " : "") +
+                            encoder + " ! filesink name=sink async=false");
   source_ = element_of(pipeline_, "source");
   g_object_set(element_of(pipeline_, "sink").get(), "location", path.c_str(), nullptr);
-  GstVideoInfo info;
-  gst_video_info_set_format(&info, shape.grey ? GST_VIDEO_FORMAT_GRAY8 : GST_VIDEO_FORMAT_RGB,
-                            static_cast<guint>(shape.width), static_cast<guint>(shape.height));
-  gst_util_double_to_fraction(shape.rate, &GST_VIDEO_INFO_FPS_N(&info),
-                              &GST_VIDEO_INFO_FPS_D(&info));
-  stride_ = static_cast<size_t>(GST_VIDEO_INFO_PLANE_STRIDE(&info, 0));
-  const CapsPtr caps(gst_video_info_to_caps(&info));
+  GstVideoInfo shown = info;
+  gst_util_double_to_fraction(rate, &GST_VIDEO_INFO_FPS_N(&shown), &GST_VIDEO_INFO_FPS_D(&shown));
+  const CapsPtr caps(gst_video_info_to_caps(&shown));
   gst_app_src_set_caps(GST_APP_SRC(source_.get()), caps.get());
   play(pipeline_, path + " cannot be written");
 }
 
 void VideoWriter::write(std::span<const uint8_t> frame, GstClockTime time) {
-  const auto rows = static_cast<size_t>(shape_.height);
-  const size_t row = frame.size() / rows;
-  GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, stride_ * rows, nullptr);
-  GstMapInfo map;
-  if (!buffer || !gst_buffer_map(buffer, &map, GST_MAP_WRITE))
+  GstBuffer* const buffer = gst_buffer_new_allocate(nullptr, frame.size(), nullptr);
+  if (!buffer || gst_buffer_fill(buffer, 0, frame.data(), frame.size()) != frame.size())
     throw std::runtime_error(path_ + ": there is no memory for a frame");
-  for (size_t y = 0; y < rows; ++y) {
-    std::memcpy(map.data + y * stride_, frame.data() + y * row, row);
-    std::memset(map.data + y * stride_ + row, 0, stride_ - row);
-  }
-  gst_buffer_unmap(buffer, &map);
   GST_BUFFER_PTS(buffer) = time;
-  GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(std::llround(GST_SECOND / shape_.rate));
+  GST_BUFFER_DURATION(buffer) = length_;
   push(pipeline_, source_, buffer, path_ + " cannot be written");
 }
 
