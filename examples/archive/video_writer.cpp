@@ -34,6 +34,16 @@ void push(const PipelinePtr& pipeline, const ElementPtr& source, GstBuffer* buff
   throw std::runtime_error(what);
 }
 
+// Of all that the encoder takes, what loses nothing of such frames and adds nothing to them. What
+// others like best, they know.
+std::string taken_by(const std::string& encoder, const GstVideoInfo& info) {
+  const bool is_rgb = GST_VIDEO_INFO_IS_RGB(&info), is_grey = GST_VIDEO_INFO_IS_GRAY(&info);
+  std::string format = gst_video_format_to_string(GST_VIDEO_INFO_FORMAT(&info));
+  if (encoder == kLossless && is_rgb) format = "BGRx";
+  if (encoder == kPicture && !is_grey) format = "RGB";
+  return encoder == kLossless || encoder == kPicture ? "video/x-raw,format=" + format + " ! " : "";
+}
+
 }  // namespace
 
 // Slices would be threads' work: a process has one core.
@@ -45,12 +55,7 @@ const char* const kPicture = "pngenc snapshot=true compression-level=2";
 VideoWriter::VideoWriter(const std::string& path, const GstVideoInfo& info, double rate,
                          const std::string& encoder)
     : path_(path), length_(static_cast<GstClockTime>(std::llround(GST_SECOND / rate))) {
-  // Of all that the lossless encoder takes, what loses nothing of this.
-  const GstVideoFormat format = GST_VIDEO_INFO_FORMAT(&info);
-  const std::string kept =
-      gst_video_format_to_string(format == GST_VIDEO_FORMAT_RGB ? GST_VIDEO_FORMAT_BGRx : format);
-  pipeline_ = make_pipeline(std::string(kSource) + "videoconvert ! " +
-                            (encoder == kLossless ? "video/x-raw,format=" + kept + " ! " : "") +
+  pipeline_ = make_pipeline(std::string(kSource) + "videoconvert ! " + taken_by(encoder, info) +
                             encoder + " ! filesink name=sink async=false");
   source_ = element_of(pipeline_, "source");
   g_object_set(element_of(pipeline_, "sink").get(), "location", path.c_str(), nullptr);

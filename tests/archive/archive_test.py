@@ -57,21 +57,33 @@ def run(folder, processes, *words, expect=0):
     return text
 
 
-def frames_of(description, pixel_format='RGB'):
-    """The frames that a pipeline gives: (time in ms, bytes without what pads rows)."""
-    pipeline = Gst.parse_launch(f'{description} ! videoconvert ! '
-                                f'video/x-raw,format={pixel_format} ! '
-                                'appsink name=end sync=false')
-    pipeline.set_state(Gst.State.PLAYING)
-    end, frames = pipeline.get_by_name('end'), []
+def samples_of(end):
     while sample := end.try_pull_sample(30 * Gst.SECOND):
-        buffer = sample.get_buffer()
-        info = GstVideo.VideoInfo.new_from_caps(sample.get_caps())
-        row = info.width * info.finfo.pixel_stride[0]
-        data = buffer.extract_dup(0, buffer.get_size())
-        rows = b''.join(data[y * info.stride[0]:y * info.stride[0] + row]
-                        for y in range(info.height))
-        frames.append((round(buffer.pts / 1e6), rows))
+        yield sample
+
+
+def bytes_of(sample):
+    """Of a frame, without what pads rows."""
+    info = GstVideo.VideoInfo.new_from_caps(sample.get_caps())
+    data = sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
+    rows, component = [], 0
+    for plane in range(info.finfo.n_planes):
+        while info.finfo.plane[component] != plane:
+            component += 1
+        row = -(-info.width >> info.finfo.w_sub[component]) * info.finfo.pixel_stride[component]
+        for y in range(-(-info.height >> info.finfo.h_sub[component])):
+            begin = info.offset[plane] + y * info.stride[plane]
+            rows.append(data[begin:begin + row])
+    return b''.join(rows)
+
+
+def frames_of(description, pixel_format=None):
+    """The frames that a pipeline gives: (time in ms, bytes)."""
+    convert = f' ! videoconvert ! video/x-raw,format={pixel_format}' if pixel_format else ''
+    pipeline = Gst.parse_launch(f'{description}{convert} ! appsink name=end sync=false')
+    pipeline.set_state(Gst.State.PLAYING)
+    frames = [(round(sample.get_buffer().pts / 1e6), bytes_of(sample))
+              for sample in samples_of(pipeline.get_by_name('end'))]
     message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message:
@@ -79,14 +91,15 @@ def frames_of(description, pixel_format='RGB'):
     return frames
 
 
-def video(path, pixel_format='RGB'):
+def video(path, pixel_format=None):
     return frames_of(f'filesrc location="{path}" ! decodebin', pixel_format)
 
 
-def make_clip(path, frames=FRAMES, width=WIDTH, height=HEIGHT, pixels='I420', seed=3):
+def make_clip(path, frames=FRAMES, width=WIDTH, height=HEIGHT, pixels='I420', seed=3,
+              encoder='avenc_ffv1'):
     common.play(f'qdmdscenesrc scene=basic,noise=2,trees seed={seed} num-buffers={frames} ! '
                 f'video/x-raw,width={width},height={height},framerate=25/1 ! videoconvert ! '
-                f'video/x-raw,format={pixels} ! avenc_ffv1 ! matroskamux ! '
+                f'video/x-raw,format={pixels} ! {encoder} ! matroskamux ! '
                 f'filesink location="{path}"').set_state(Gst.State.NULL)
 
 
@@ -138,26 +151,31 @@ def any_number_of_processes(folder, method):
     return alone, solves
 
 
-def element_of_window(clip, first, count, method, output):
-    """What the element sends of frames first .. first + count - 1, and its message."""
-    feed = frames_of(f'filesrc location="{clip}" ! decodebin', 'BGRx')[first:first + count]
-    pipeline = Gst.parse_launch(
-        f'appsrc name=source format=time caps=video/x-raw,format=BGRx,width={WIDTH},'
-        f'height={HEIGHT},framerate=25/1 ! qdmdbackground window-size={WINDOW} method={method} '
-        f'output={output} stabilize=off post-messages=true ! videoconvert ! '
-        f'video/x-raw,format=RGB ! appsink name=end sync=false')
+def decoded(clip):
+    """Its frames as they are decoded, and their caps."""
+    pipeline = Gst.parse_launch(f'filesrc location="{clip}" ! decodebin ! appsink name=end sync=false')
     pipeline.set_state(Gst.State.PLAYING)
+    samples = list(samples_of(pipeline.get_by_name('end')))
+    buffers = [sample.get_buffer().copy_deep() for sample in samples]
+    caps = samples[0].get_caps().copy()
+    pipeline.set_state(Gst.State.NULL)
+    return buffers, caps
+
+
+def element_of_window(clip, first, count, method, output, into=''):
+    """What the element sends of frames first .. first + count - 1, and its message."""
+    buffers, caps = decoded(clip)
+    pipeline = Gst.parse_launch(
+        f'appsrc name=source format=time ! qdmdbackground window-size={WINDOW} method={method} '
+        f'output={output} stabilize=off post-messages=true {into} ! appsink name=end sync=false')
     source, end = pipeline.get_by_name('source'), pipeline.get_by_name('end')
-    for t, (_, frame) in enumerate(feed):
-        buffer = Gst.Buffer.new_wrapped(frame)
+    source.set_caps(caps)
+    pipeline.set_state(Gst.State.PLAYING)
+    for t, buffer in enumerate(buffers[first:first + count]):
         buffer.pts, buffer.duration = t * 40 * Gst.MSECOND, 40 * Gst.MSECOND
         source.push_buffer(buffer)
     source.end_of_stream()
-    frames = []
-    while sample := end.try_pull_sample(30 * Gst.SECOND):
-        data = sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
-        stride = len(data) // HEIGHT
-        frames.append(b''.join(data[y * stride:y * stride + 3 * WIDTH] for y in range(HEIGHT)))
+    frames = [bytes_of(sample) for sample in samples_of(end)]
     message = pipeline.get_bus().pop_filtered(Gst.MessageType.ELEMENT).get_structure()
     pipeline.set_state(Gst.State.NULL)
     return frames, message
@@ -170,7 +188,9 @@ def as_the_element(folder, method, alone, solves):
         mine = slice(WINDOW * window, min(WINDOW * (window + 1), FRAMES))
         shown = slice(mine.start - first, WINDOW)
         clip = folder / 'clip.mkv'
-        backgrounds, message = element_of_window(clip, first, WINDOW, method, 'background')
+        # A PNG has R, G and B; videos are what the element sends, sample by sample.
+        backgrounds, message = element_of_window(clip, first, WINDOW, method, 'background',
+                                                 '! videoconvert ! video/x-raw,format=RGB')
         number = f'-{window + 1}.png' if window else '.png'
         assert alone[0][number] == backgrounds[-1], f'{method}: background of window {window}'
         eigenvalue = [message.get_double(f'lambda-{part}')[1] for part in ('real', 'imaginary')]
@@ -181,7 +201,10 @@ def as_the_element(folder, method, alone, solves):
         # What masks learn from the frames before is not there in the last window.
         if first == WINDOW * window:
             masks, _ = element_of_window(clip, first, WINDOW, method, 'mask')
-            assert [mask[::3] for mask in masks[shown]] == [mask for _, mask in alone[1][mine]], \
+            # The element's are black and white in the video's range.
+            black_and_white = bytes.maketrans(bytes((16, 235)), bytes((0, 255)))
+            assert [mask[:WIDTH * HEIGHT].translate(black_and_white) for mask in masks[shown]] \
+                == [mask for _, mask in alone[1][mine]], \
                 f'{method}: masks of window {window}'
 
 
@@ -190,13 +213,71 @@ def one_method(folder, method):
     as_the_element(folder, method, alone, solves)
 
 
+def colours_of_recordings(folder):
+    """Videos have the colours, the chroma and the range of what is read, and 8 bits."""
+    for pixels, kept, encoder in (
+            ('Y42B', 'Y42B', 'avenc_ffv1'), ('Y444', 'Y444', 'avenc_ffv1'),
+            ('GRAY8', 'GRAY8', 'avenc_ffv1'), ('BGRx', 'BGRx', 'avenc_ffv1'),
+            ('A420', 'I420', 'avenc_ffv1'), ('YUY2', 'Y42B', 'capsfilter caps=video/x-raw'),
+            ('Y41B', 'Y444', 'avenc_ffv1'), ('I420_10LE', 'I420', 'avenc_ffv1'),
+            ('I422_10LE', 'Y42B', 'avenc_ffv1'), ('I420', 'I420', 'jpegenc quality=100')):
+        clip = folder / f'{pixels}-{encoder[:4]}.mkv'
+        # GStreamer's videocrop leaves out the last V of an odd row.
+        make_clip(clip, WINDOW, WIDTH - (pixels == 'YUY2'), pixels=pixels, encoder=encoder)
+        for processes in (0, 3):
+            run(folder, processes, clip, '--background', folder / f'k{processes}.png',
+                '--cutout', folder / f'k{processes}.mkv', '--window', WINDOW, '--quiet')
+        one, other = (video(folder / f'k{processes}.mkv') for processes in (0, 3))
+        assert one == other, f'{pixels}: cut-outs of one process and of three'
+        assert video(folder / 'k0.png') == video(folder / 'k3.png'), f'{pixels}: backgrounds'
+        caps = decoded(folder / 'k0.mkv')[1].to_string()
+        assert f'format=(string){kept},' in caps, f'{pixels}: {caps}'
+        if pixels != kept:
+            continue
+        cutouts, _ = element_of_window(clip, 0, WINDOW, 'robust', 'cutout')
+        # The element keeps the byte that nobody looks at.
+        if pixels == 'BGRx':
+            cutouts = [[frame[c::4] for c in range(3)] for frame in cutouts]
+            one = [(time, [frame[c::4] for c in range(3)]) for time, frame in one]
+        assert cutouts == [frame for _, frame in one], f'{pixels}: not what the element sends'
+
+
+def files_of_other_colours(folder):
+    """All are read as the first one is."""
+    make_clip(folder / 'colour.mkv', 12, seed=5, pixels='BGRx')
+    make_clip(folder / 'grey.mkv', 12, seed=6, pixels='GRAY8')
+    for files, kept in ((('clip', 'colour', 'grey'), 'I420'), (('colour', 'clip'), 'BGRx'),
+                        (('grey', 'clip'), 'GRAY8')):
+        for processes in (0, 2):
+            run(folder, processes, *(folder / f'{name}.mkv' for name in files), '--foreground',
+                folder / f'o{processes}.mkv', '--window', 20, '--quiet')
+        one, other = (video(folder / f'o{processes}.mkv') for processes in (0, 2))
+        assert one == other, f'{files}: one process and two'
+        assert len(one) == 12 * len(files) + (FRAMES - 12), f'{files}: {len(one)} frames'
+        caps = decoded(folder / 'o0.mkv')[1].to_string()
+        assert f'format=(string){kept},' in caps, f'{files}: {caps}'
+
+
+def rows_that_share_samples(folder):
+    """Bands begin with them, in low pictures, too."""
+    for width, height in ((33, 7), (64, 96), (97, 49), (5, 100)):
+        clip = folder / 'low.mkv'
+        make_clip(clip, 6, width, height)
+        names = [folder / f'r{processes}.mkv' for processes in (0, 2, 3)]
+        for processes, name in zip((0, 2, 3), names):
+            run(folder, processes, clip, '--foreground', name, '--window', 6, '--quiet')
+        whole = video(names[0])
+        for name in names[1:]:
+            assert video(name) == whole, f'{width}x{height}: {name.name}'
+
+
 def files_and_pictures(folder):
     """Two files, and the frames as PNG pictures, are the same recording as one file."""
-    make_clip(folder / 'first.mkv', 24, seed=5)
-    make_clip(folder / 'second.mkv', 9, seed=6)
+    make_clip(folder / 'first.mkv', 24, seed=5, pixels='BGRx')
+    make_clip(folder / 'second.mkv', 9, seed=6, pixels='BGRx')
     pictures = folder / 'pictures'
     pictures.mkdir()
-    frames = video(folder / 'first.mkv') + video(folder / 'second.mkv')
+    frames = video(folder / 'first.mkv', 'RGB') + video(folder / 'second.mkv', 'RGB')
     for number, (_, frame) in enumerate(frames):
         pipeline = Gst.parse_launch(
             f'appsrc name=source format=time caps=video/x-raw,format=RGB,width={WIDTH},'
@@ -527,7 +608,9 @@ def main():
     cases = [(f'{method} of any number of processes, and of the element', one_method, method)
              for method in ('qdmd', 'dmd', 'robust')]
     cases += [(check.__name__.replace('_', ' '), check)
-              for check in (files_and_pictures, more_outputs, killed_and_resumed,
+              for check in (colours_of_recordings, files_of_other_colours,
+                            rows_that_share_samples,
+                            files_and_pictures, more_outputs, killed_and_resumed,
                             killed_while_parts_are_removed, resumed_with_other_options,
                             what_is_read_stays, pictures_that_are_odd,
                             a_recording_that_is_cut_off,
