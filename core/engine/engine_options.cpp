@@ -99,7 +99,7 @@ LivePlan plan_of(const EngineOptions& options, int width, int height) {
 std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int height) {
   LearnOptions learnt = options;
   const bool moves = options.stabilize != Stabilize::off && options.method != Method::robust;
-  if (moves || options.team) learnt.chroma_columns = learnt.chroma_rows = 1;
+  if (moves) learnt.chroma_columns = learnt.chroma_rows = 1;
   return Learner::make(learnt, width, band_of(options, width, height));
 }
 

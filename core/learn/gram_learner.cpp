@@ -40,7 +40,7 @@ GramLearner::GramLearner(const LearnOptions& options, int width, const Band& ban
 
 // Solvers that read pixels want each to have its own samples.
 bool GramLearner::keeps_shared() const {
-  return options_.keeps_shared() && options_.depth == 8 && band_.is_whole() &&
+  return options_.keeps_shared() && options_.depth == 8 &&
          (options_.method == Method::dmd ||
           (options_.dmd.solver != Solver::qr && options_.dmd.solver != Solver::adjoint));
 }
@@ -137,11 +137,13 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
   const Clock::Span span_of_time(*room_.clock, Clock::products);
   const SnapshotRange columns = columns_of(span);
   if (shares_chroma()) {
-    const auto rows = static_cast<size_t>(columns.shape().chroma_height());
+    // Bands begin and end with them.
+    const int together = columns.shape().rows, before = band_.own_begin() / together;
+    const auto rows = static_cast<size_t>((band_.own_rows() + together - 1) / together);
     const size_t first = slice.first(rows, 1), count = slice.size(rows, 1);
     // The first slice begins a group, however thin it is.
     if (slice.index == 0 || count > 0)
-      gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
+      gram_.add_rows(columns, frames, before + static_cast<int>(first), static_cast<int>(count));
     return;
   }
   if (band_.is_whole()) {
