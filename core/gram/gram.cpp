@@ -109,13 +109,14 @@ void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, 
   }
 }
 
-void SlidingGram::add_rows(const SnapshotRange& span, int frames, int first, int count) {
+void SlidingGram::add_rows(const SnapshotRange& span, int frames, int first, int count,
+                           bool begins) {
   make_room();
   list_planes(span);
   for (int start = span.size() - frames; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
     multiply_rows(end - start, end, first, count);
-    store(span, start, end, first == 0);
+    store(span, start, end, begins);
   }
 }
 

@@ -55,7 +55,11 @@ class SlidingGram {
   void add_slice(const SnapshotRange& span, int count, size_t first, size_t length, bool begins);
   // The same for snapshots of the shape, as far as the pixels of chroma rows first .. first + count
   // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
-  void add_rows(const SnapshotRange& span, int frames, int first, int count);
+  void add_rows(const SnapshotRange& span, int frames, int first, int count) {
+    add_rows(span, frames, first, count, first == 0);
+  }
+  // The same of planes of which another row is the first that counts. begins: that call does.
+  void add_rows(const SnapshotRange& span, int frames, int first, int count, bool begins);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;

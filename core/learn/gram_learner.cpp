@@ -143,7 +143,8 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
     const size_t first = slice.first(rows, 1), count = slice.size(rows, 1);
     // The first slice begins a group, however thin it is.
     if (slice.index == 0 || count > 0)
-      gram_.add_rows(columns, frames, before + static_cast<int>(first), static_cast<int>(count));
+      gram_.add_rows(columns, frames, before + static_cast<int>(first), static_cast<int>(count),
+                     slice.index == 0);
     return;
   }
   if (band_.is_whole()) {
