@@ -77,21 +77,28 @@ std::vector<uint8_t> rows_of(PackedPicture& picture, int first, int count) {
   return {begin, begin + count * picture.row_stride};
 }
 
-PackedPicture kept_rows(const Street& street, int t, const Band& band) {
-  const std::vector<uint8_t> planes = street.frame(t);
-  const auto row = static_cast<size_t>(street.width);
-  const size_t pixels = row * static_cast<size_t>(street.height),
-               kept = row * static_cast<size_t>(band.rows());
-  std::vector<uint8_t> part;
-  for (size_t c = 0; c < 3; ++c) {
-    const auto begin = planes.begin() +
-                       static_cast<ptrdiff_t>(c * pixels + row * static_cast<size_t>(band.first()));
-    part.insert(part.end(), begin, begin + static_cast<ptrdiff_t>(kept));
+// The kept rows of a frame, whose pixels share samples as the options say: that of the first one.
+struct KeptRows {
+  std::vector<uint8_t> channel[3];
+  ImageView view;
+
+  KeptRows(const Street& street, int t, const Band& band, const EngineOptions& options) {
+    const std::vector<uint8_t> planes = street.frame(t);
+    const size_t pixels = static_cast<size_t>(street.width) * static_cast<size_t>(street.height);
+    view.width = street.width;
+    view.height = band.rows();
+    for (size_t c = 0; c < 3; ++c) {
+      const int columns = c > 0 ? options.chroma_columns : 1,
+                rows = c > 0 ? options.chroma_rows : 1;
+      EXPECT_EQ(band.first() % rows, 0) << "pixels that share a sample are in two bands";
+      for (int y = band.first(); y < band.first() + band.rows(); y += rows)
+        for (int x = 0; x < street.width; x += columns)
+          channel[c].push_back(planes[c * pixels + static_cast<size_t>(y * street.width + x)]);
+      view.channel[c] = channel[c].data();
+      view.own[c] = {1, (street.width + columns - 1) / columns, columns, rows};
+    }
   }
-  PackedPicture picture(street.width, band.rows());
-  picture.fill(part);
-  return picture;
-}
+};
 
 Results run(const Case& c, Team* team) {
   EngineOptions options = c.options;
@@ -128,7 +135,7 @@ Results run(const Case& c, Team* team) {
     }
   };
   for (int t = 0; t < c.frames; ++t) {
-    EXPECT_TRUE(engine.push(kept_rows(c.street, t, band).in()).ok());
+    EXPECT_TRUE(engine.push(KeptRows(c.street, t, band, options).view).ok());
     if (c.anew && (t + 1) % options.window_size == 0 && t + 1 < c.frames) {
       EXPECT_TRUE(engine.drain().ok());
       take();
@@ -221,6 +228,21 @@ TEST(Band, RobustOfSharedPicturesIsThatOfWholeOnes) {
   expect_shared_as_whole({"robust", {161, 135}, options_of(Method::robust, 20), 50}, {1, 2, 3, 4});
 }
 
+TEST(Band, PixelsThatShareChroma) {
+  for (Method method : {Method::qdmd, Method::dmd, Method::robust})
+    for (int rows : {1, 2}) {
+      EngineOptions options = options_of(method, 12);
+      options.colours = Colours::yuv;
+      options.chroma_columns = 2;
+      options.chroma_rows = rows;
+      // Rows of cells are two or three pixels high: some begin inside of a sample.
+      const Case c = {"chroma", {129, 125}, options, 30};
+      expect_shared_as_whole(c, {1, 2, 3, 4});
+      options.sample_step = 3;
+      expect_shared_as_whole({"chroma, samples", {65, 43}, options, 20}, {2, 5});
+    }
+}
+
 TEST(Band, RobustWithLargeNeighbourhoods) {
   // The background is searched two pixels apart, and two pixels vote.
   expect_shared_as_whole({"large", {500, 481}, options_of(Method::robust, 12), 12}, {2, 3});
@@ -274,7 +296,8 @@ TEST(Band, BeginsAnewLikeAnotherStream) {
     ASSERT_TRUE(engine.configure(c.options, 97, 91).ok());
     PackedPicture out(97, 91);
     for (int t = 0; t < 12; ++t)
-      ASSERT_TRUE(engine.push(kept_rows(c.street, 12 * window + t, engine.band()).in()).ok());
+      ASSERT_TRUE(
+          engine.push(KeptRows(c.street, 12 * window + t, engine.band(), c.options).view).ok());
     ASSERT_TRUE(engine.drain().ok());
     for (int t = 0; t < 12; ++t) {
       for (size_t k = 0; k < std::size(kOutputs); ++k) {
@@ -308,26 +331,39 @@ TEST(Band, RefusesWhatNeedsTheWholePicture) {
     options.method = Method::qdmd;
     EXPECT_FALSE(engine.configure(options, 64, 1).ok()) << "there are more members than rows";
     EXPECT_TRUE(engine.configure(options, 64, 2).ok());
+    options.colours = Colours::yuv;
+    options.chroma_columns = options.chroma_rows = 2;
+    EXPECT_FALSE(engine.configure(options, 64, 2).ok()) << "both rows have the same chroma";
+    EXPECT_TRUE(engine.configure(options, 64, 3).ok());
   });
 }
 
-// Each row is somebody's own, and only rows around the own ones are kept besides.
+// Each row is somebody's own, and only rows around the own ones are kept besides. Pixels that share
+// a sample stay together.
 TEST(Band, OwnRowsCoverThePicture) {
   for (int size = 1; size <= 7; ++size)
-    for (int height : {7, 48, 97, 1080}) {
-      std::vector<int> owners(static_cast<size_t>(height));
-      run_team(size, [&](ThreadTeam* team) {
-        EngineOptions options = options_of(Method::robust, 8);
-        options.team = team;
-        const Band band = band_of(options, 1920, height);
-        EXPECT_EQ(band.height(), height);
-        for (int y = band.own_first(); y < band.own_end(); ++y) ++owners[static_cast<size_t>(y)];
-        EXPECT_GE(band.own_begin(), 0);
-        EXPECT_LE(band.own_begin() + band.own_rows(), band.rows());
-        EXPECT_LE(band.first() + band.rows(), height);
-      });
-      for (int owner : owners) EXPECT_EQ(owner, 1);
-    }
+    for (int height : {7, 48, 97, 1080})
+      for (int together : {1, 2}) {
+        if (size * together > height) continue;
+        std::vector<int> owners(static_cast<size_t>(height));
+        run_team(size, [&](ThreadTeam* team) {
+          EngineOptions options = options_of(Method::robust, 8);
+          options.team = team;
+          options.chroma_rows = together;
+          const Band band = band_of(options, 1920, height);
+          EXPECT_EQ(band.height(), height);
+          for (int y = band.own_first(); y < band.own_end(); ++y) ++owners[static_cast<size_t>(y)];
+          EXPECT_GE(band.own_begin(), 0);
+          EXPECT_LE(band.own_begin() + band.own_rows(), band.rows());
+          EXPECT_LE(band.first() + band.rows(), height);
+          EXPECT_EQ(band.first() % together, 0);
+          EXPECT_EQ(band.own_begin() % together, 0);
+          if (band.own_end() < height) {
+            EXPECT_EQ(band.own_end() % together, 0);
+          }
+        });
+        for (int owner : owners) EXPECT_EQ(owner, 1);
+      }
 }
 
 }  // namespace
