@@ -79,14 +79,11 @@ def run(folder, films, processes, method, outputs, window, bind='core'):
 
 
 def decoding(folder, video, width, height, frames):
-    """Seconds a frame of one core, without and with colours converted."""
+    """Seconds a frame of one core."""
     film = clip(video, folder, width, height, frames)
-    start = f'filesrc location={film} ! decodebin'
     # What a pipeline of no frame takes is small beside it.
-    plain = [launch(f'{start} ! fakesink sync=false', 0) for _ in range(3)]
-    converted = [launch(f'{start} ! videoconvert ! video/x-raw,format=BGRx ! fakesink sync=false', 0)
-                 for _ in range(3)]
-    return min(plain) / frames, max(0.0, min(converted) - min(plain)) / frames
+    return min(launch(f'filesrc location={film} ! decodebin ! fakesink sync=false', 0)
+               for _ in range(3)) / frames
 
 
 def is_short(outputs):
@@ -158,7 +155,8 @@ def bytes_table(reports):
 
 def memory_table(folder, video):
     """Beside what the same job takes with windows of two frames."""
-    rows = [['1/n and a tenth', *(f'{1 / n + 0.1:.3f}' for n in MEMORY_PROCESSES), '']]
+    rows = [[name, *(f'{part * (1 / n + 0.1):.3f}' for n in MEMORY_PROCESSES), '']
+            for name, part in (('1/n and a tenth', 1), ('the same of a window in I420', 0.5))]
     for width, height, frames, method in MEMORY_CASES:
         film, little = (clip(video, folder, width, height, count) for count in (frames, 20))
         window = 3 * width * height * frames
@@ -172,11 +170,11 @@ def memory_table(folder, video):
             beside = max(beside, *bare)
         rows.append([*row, f'{beside / 2**20:.0f} MiB'])
     print(file=sys.stderr)
-    return page.table(['most memory of a process, of the whole window',
+    return page.table(['most memory of a process, of a window in RGB',
                        *(f'n = {n}' for n in MEMORY_PROCESSES), 'at most beside that'], rows)
 
 
-def model_table(found, decode, convert):
+def model_table(found, decode):
     """Seconds a frame, of machines with one core each; every part is one that was measured."""
     pixels, measured = MODEL_WIDTH * MODEL_HEIGHT, WIDTH * HEIGHT
     qdmd = found['`qdmd`, background and masks'][1]
@@ -199,7 +197,7 @@ def model_table(found, decode, convert):
         for method in ('qdmd', 'robust'):
             products = 2 * 36 * (MODEL_WINDOW if method == 'qdmd' else 0)
             sent = others * (mask + cells + products)
-            alone = decode + convert / machines + work[method] / machines
+            alone = decode + work[method] / machines
             row.append(f'{alone:.2f}')
             for rate in (1e9, 1e10):
                 row.append(f'{alone + 8 * sent / rate:.2f}')
@@ -208,7 +206,7 @@ def model_table(found, decode, convert):
     for method in ('qdmd', 'robust'):
         head += [f'`{method}`, s a frame without a network', '1 Gbit/s', '10 Gbit/s']
     text = (f'Decoding: {1000 * decode:.0f} ms a frame of {MODEL_WIDTH}x{MODEL_HEIGHT} on one core, '
-            f'by every machine; colours {1000 * convert:.0f} ms, inner products with a window of '
+            f'by every machine; inner products with a window of '
             f'{MODEL_WINDOW} frames {pixels * product * MODEL_WINDOW:.2f} s, the rest '
             f'{work["qdmd"] - pixels * product * MODEL_WINDOW:.2f} s (`qdmd`) and '
             f'{work["robust"]:.2f} s (`robust`), which machines divide.')
@@ -228,14 +226,14 @@ def main():
     for report, of_qdmd in zip(reports, products):
         report['bytes-received-a-frame']['products'] = \
             of_qdmd['bytes-received-a-frame']['products']
-    decode, convert = decoding(folder, video, MODEL_WIDTH, MODEL_HEIGHT, 12)
+    decode = decoding(folder, video, MODEL_WIDTH, MODEL_HEIGHT, 12)
     pathlib.Path(folder, 'load-after').write_text(subprocess.check_output(['uptime'], text=True))
     page.put(target, {
         'speed': speed_table(found),
         'parts': parts_table(found),
         'bytes': bytes_table(reports),
         'memory': memory_table(folder, video),
-        'model': model_table(found, decode, convert),
+        'model': model_table(found, decode),
         'machine': page.machine(folder),
     })
 
