@@ -106,8 +106,8 @@ class GridPicture {
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
 // The same of all channels of a picture into picture `frame` of `cells`, where the picture has the
-// band's rows only: the cells of its own rows. Bands end where rows of cells do, and their pictures
-// share no samples. pool may be null.
+// band's rows only: the cells of its own rows. Bands end where rows of cells do, and never between
+// pixels that share a sample. pool may be null.
 void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
                     GridFrames* cells, int frame, Pool* pool);
 // All members have the cells that each of them found, for good.

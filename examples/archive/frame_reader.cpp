@@ -43,27 +43,45 @@ std::string fraction_of(double rate) {
   return std::to_string(numerator) + "/" + std::to_string(denominator);
 }
 
-// In what frames like these are kept: all of their colours, as the element takes them.
-GstVideoFormat kept_format(const GstVideoInfo& info) {
-  if (GST_VIDEO_INFO_IS_GRAY(&info)) return GST_VIDEO_FORMAT_GRAY8;
+// In what frames like these are kept: all of their colours, as the element takes them. Of pictures,
+// which may be grey now and then: colour ones.
+GstVideoFormat kept_format(const GstVideoInfo& info, bool pictures) {
+  if (GST_VIDEO_INFO_IS_GRAY(&info) && !pictures) return GST_VIDEO_FORMAT_GRAY8;
   if (!GST_VIDEO_INFO_IS_YUV(&info)) return GST_VIDEO_FORMAT_BGRx;
   if (GST_VIDEO_FORMAT_INFO_W_SUB(info.finfo, 1) != 1) return GST_VIDEO_FORMAT_Y444;
   return GST_VIDEO_FORMAT_INFO_H_SUB(info.finfo, 1) == 1 ? GST_VIDEO_FORMAT_I420
                                                          : GST_VIDEO_FORMAT_Y42B;
 }
 
-// Of pictures made of frames like `info`, of that size.
-GstVideoInfo picture_info(const GstVideoInfo& info, int width, int height) {
-  const GstVideoFormat format = kept_format(info);
+CharsPtr text_of(const GstVideoColorimetry& colours) {
+  return CharsPtr(gst_video_colorimetry_to_string(&colours));
+}
+
+// Of pictures of the size and colours of `info`, in frames of that format.
+GstVideoInfo picture_info(const GstVideoInfo& info, GstVideoFormat format) {
   GstVideoInfo picture;
   gst_video_info_set_format(&picture,
                             format == GST_VIDEO_FORMAT_BGRx ? GST_VIDEO_FORMAT_RGB : format,
-                            static_cast<guint>(width), static_cast<guint>(height));
-  picture.colorimetry = info.colorimetry;
+                            static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info)),
+                            static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info)));
+  // Grey ones that become R, G and B have those of R, G and B.
+  if (GST_VIDEO_INFO_IS_RGB(&picture) == GST_VIDEO_INFO_IS_RGB(&info))
+    picture.colorimetry = info.colorimetry;
   picture.chroma_site = info.chroma_site;
+  picture.interlace_mode = info.interlace_mode;
+  GST_VIDEO_INFO_FIELD_ORDER(&picture) = GST_VIDEO_INFO_FIELD_ORDER(&info);
   picture.par_n = info.par_n;
   picture.par_d = info.par_d;
   return picture;
+}
+
+// What all frames are converted to.
+CapsPtr caps_of(GstVideoFormat format, const GstVideoInfo& picture) {
+  CapsPtr caps(gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
+                                   gst_video_format_to_string(format), nullptr));
+  if (const CharsPtr colours = text_of(picture.colorimetry))
+    gst_caps_set_simple(caps.get(), "colorimetry", G_TYPE_STRING, colours.get(), nullptr);
+  return caps;
 }
 
 // The pictures of a folder: those of the first kind that there is.
@@ -87,34 +105,37 @@ std::vector<std::string> pictures_of(const fs::path& folder) {
 struct FrameReader::Crop {
   std::mutex lock;
   std::function<Rows(const RecordingInfo&)> choose;
+  bool pictures = false;
   ElementPtr element, format;
-  RecordingInfo info, first;
+  CapsPtr kept;  // once known
+  RecordingInfo first;
   bool known = false;
   Rows wanted, left;
   std::string refused;
 
   // With the lock.
-  void set(const RecordingInfo& seen) {
-    info = seen;
-    if (known && (seen.width != first.width || seen.height != first.height)) {
-      refused = "frames of " + std::to_string(seen.width) + "x" + std::to_string(seen.height) +
+  void set(const GstVideoInfo& seen) {
+    const int width = GST_VIDEO_INFO_WIDTH(&seen), height = GST_VIDEO_INFO_HEIGHT(&seen);
+    if (known && (width != first.width || height != first.height)) {
+      refused = "frames of " + std::to_string(width) + "x" + std::to_string(height) +
                 " follow frames of " + std::to_string(first.width) + "x" +
                 std::to_string(first.height) + ": a recording has one size";
       return;
     }
     if (!known) {
-      first = seen;
+      const GstVideoFormat format = kept_format(seen, pictures);
+      first = {width, height, 0, picture_info(seen, format)};
+      if (GST_VIDEO_INFO_FPS_N(&seen) > 0)
+        first.rate = double(GST_VIDEO_INFO_FPS_N(&seen)) / GST_VIDEO_INFO_FPS_D(&seen);
       known = true;
-      const CapsPtr kept(gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
-                                             gst_video_format_to_string(kept_format(seen.picture)),
-                                             nullptr));
-      g_object_set(format.get(), "caps", kept.get(), nullptr);
-      wanted = choose(seen);
+      kept = caps_of(format, first.picture);
+      wanted = choose(first);
       left.first = std::max(0, wanted.first / kAround * kAround - kAround);
       const int end = (wanted.first + wanted.count + 2 * kAround - 1) / kAround * kAround;
-      left.count = std::min(seen.height, end) - left.first;
+      left.count = std::min(height, end) - left.first;
     }
-    g_object_set(element.get(), "top", left.first, "bottom", seen.height - left.first - left.count,
+    g_object_set(format.get(), "caps", kept.get(), nullptr);
+    g_object_set(element.get(), "top", left.first, "bottom", height - left.first - left.count,
                  nullptr);
   }
 
@@ -125,18 +146,22 @@ struct FrameReader::Crop {
     gst_event_parse_caps(event, &caps);
     GstVideoInfo info;
     if (!gst_video_info_from_caps(&info, caps)) return GST_PAD_PROBE_OK;
-    RecordingInfo seen = {
-        GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info), 0,
-        picture_info(info, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info))};
-    if (GST_VIDEO_INFO_FPS_N(&info) > 0)
-      seen.rate = double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info);
     auto* const crop = static_cast<Crop*>(data);
     const std::lock_guard held(crop->lock);
     try {
-      crop->set(seen);
+      crop->set(info);
     } catch (const std::exception& error) {
       crop->refused = error.what();
     }
+    // If nothing says what colours are, GStreamer takes it from the height: from that of the
+    // picture.
+    const CharsPtr colours = text_of(info.colorimetry);
+    if (!colours || gst_structure_has_field(gst_caps_get_structure(caps, 0), "colorimetry"))
+      return GST_PAD_PROBE_OK;
+    const CapsPtr said(gst_caps_copy(caps));
+    gst_caps_set_simple(said.get(), "colorimetry", G_TYPE_STRING, colours.get(), nullptr);
+    GST_PAD_PROBE_INFO_DATA(probe) = gst_event_new_caps(said.get());
+    gst_event_unref(event);
     return GST_PAD_PROBE_OK;
   }
 };
@@ -155,6 +180,7 @@ FrameReader::FrameReader(std::vector<std::string> paths, double rate,
   for (const std::string& file : files_)
     if (!std::ifstream(file))
       throw std::runtime_error(file + " cannot be read: give files, or a folder of pictures");
+  crop_->pictures = pictures_;
   crop_->choose = [this](const RecordingInfo& info) { return choose_(info); };
 }
 
@@ -183,7 +209,6 @@ void FrameReader::open() {
     const std::lock_guard held(crop_->lock);
     crop_->element = element_of(pipeline_, "crop");
     crop_->format = element_of(pipeline_, "format");
-    if (format_) g_object_set(crop_->format.get(), "caps", format_.get(), nullptr);
   }
   if (!pictures_) g_object_set(source_.get(), "location", files_[next_file_++].c_str(), nullptr);
   GstPad* const pad = gst_element_get_static_pad(crop_->element.get(), "sink");
@@ -257,12 +282,16 @@ bool FrameReader::next_of_file() {
 void FrameReader::take(SamplePtr sample) {
   sample_ = std::move(sample);
   GstBuffer* const buffer = gst_sample_get_buffer(sample_.get());
-  const GstCaps* const caps = gst_sample_get_caps(sample_.get());
   GstVideoInfo info;
-  const bool is_video = gst_video_info_from_caps(&info, caps);
+  const bool is_video = gst_video_info_from_caps(&info, gst_sample_get_caps(sample_.get()));
   if (is_video) frame_.emplace(&info, buffer, GST_MAP_READ);
   if (!is_video || !*frame_) throw std::runtime_error("a decoded frame cannot be read");
-  if (!known_) know(info, caps);
+  if (!known_) {
+    const std::lock_guard held(crop_->lock);
+    info_ = crop_->first;
+    known_ = true;
+  }
+  if (info_.rate <= 0) info_.rate = rate_;
   const auto length = static_cast<GstClockTime>(std::llround(GST_SECOND / info_.rate));
   const GstSegment* const segment = gst_sample_get_segment(sample_.get());
   const GstClockTime shown =
@@ -273,22 +302,6 @@ void FrameReader::take(SamplePtr sample) {
   // Times grow, whatever a file says.
   if (end_ > 0 && time_ + length / 2 < end_) time_ = end_;
   end_ = time_ + length;
-}
-
-// The first frame's.
-void FrameReader::know(const GstVideoInfo& frame, const GstCaps* caps) {
-  {
-    const std::lock_guard held(crop_->lock);
-    info_ = crop_->first;
-  }
-  if (info_.rate <= 0) info_.rate = rate_;
-  info_.picture = picture_info(frame, info_.width, info_.height);
-  // What can be converted; the size, which is of a band here, and the rate are the file's.
-  format_.reset(gst_caps_new_empty_simple("video/x-raw"));
-  for (const char* const field : {"format", "colorimetry", "chroma-site"})
-    if (const GValue* const value = gst_structure_get_value(gst_caps_get_structure(caps, 0), field))
-      gst_caps_set_value(format_.get(), field, value);
-  known_ = true;
 }
 
 ImageView FrameReader::view() const {

@@ -30,8 +30,9 @@ struct Rows {
 // Reads files one after another as one recording, or a folder's pictures (PNG or JPEG) in the order
 // of their names. Whatever can be decoded is; other rows than those that are wanted are cropped
 // before anything is converted. Frames keep their colours and how many pixels share a sample of
-// them, but have 8 bits and no alpha; if files differ in that, all become like the first. Throws
-// std::runtime_error with a sentence for the user.
+// them, but have 8 bits and no alpha; if they differ in that, all become like the first. Grey
+// pictures become coloured, because others may follow. Throws std::runtime_error with a sentence
+// for the user.
 class FrameReader {
  public:
   // choose: which rows are wanted, once the size is known. rate: of pictures.
@@ -58,7 +59,6 @@ class FrameReader {
   bool next_of_file();
   void note_early_end();
   void take(SamplePtr sample);
-  void know(const GstVideoInfo& frame, const GstCaps* caps);
 
   std::vector<std::string> files_, early_ends_;
   bool pictures_ = false;
@@ -68,8 +68,6 @@ class FrameReader {
   std::unique_ptr<Crop> crop_;
   PipelinePtr pipeline_;
   ElementPtr source_, sink_;
-  // What later files are converted to.
-  CapsPtr format_;
   RecordingInfo info_;
   bool known_ = false;
   SamplePtr sample_;

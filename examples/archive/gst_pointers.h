@@ -15,6 +15,7 @@ struct Free {
   void operator()(GstMessage* message) const { gst_message_unref(message); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
   void operator()(GError* error) const { g_error_free(error); }
+  void operator()(gchar* text) const { g_free(text); }
   void operator()(gpointer object) const { gst_object_unref(object); }
 };
 
@@ -28,6 +29,7 @@ using PipelinePtr = std::unique_ptr<GstElement, StopPipeline>;
 using ElementPtr = std::unique_ptr<GstElement, Free>;
 using SamplePtr = std::unique_ptr<GstSample, Free>;
 using MessagePtr = std::unique_ptr<GstMessage, Free>;
+using CharsPtr = std::unique_ptr<gchar, Free>;
 using CapsPtr = std::unique_ptr<GstCaps, Free>;
 using BusPtr = std::unique_ptr<GstBus, Free>;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <new>
 
 namespace qdmd::archive {
 namespace {
@@ -23,6 +24,7 @@ Picture::Picture(const GstVideoInfo& like, int width, int height) {
       gst_buffer_new_wrapped_full(static_cast<GstMemoryFlags>(0), bytes_.data(), bytes_.size(), 0,
                                   bytes_.size(), nullptr, nullptr));
   mapped_.emplace(&info_, buffer.get(), GST_MAP_WRITE);
+  if (!*mapped_) throw std::bad_alloc();
 }
 
 size_t Picture::bytes_before(int plane, int end) const {
