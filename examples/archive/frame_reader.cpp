@@ -106,7 +106,7 @@ struct FrameReader::Crop {
   std::mutex lock;
   std::function<Rows(const RecordingInfo&)> choose;
   bool pictures = false;
-  ElementPtr element, format;
+  ElementPtr element, between, format;
   CapsPtr kept;  // once known
   RecordingInfo first;
   bool known = false;
@@ -123,17 +123,25 @@ struct FrameReader::Crop {
       return;
     }
     if (!known) {
-      const GstVideoFormat format = kept_format(seen, pictures);
-      first = {width, height, 0, picture_info(seen, format)};
+      const GstVideoFormat like_this = kept_format(seen, pictures);
+      first = {width, height, 0, picture_info(seen, like_this)};
       if (GST_VIDEO_INFO_FPS_N(&seen) > 0)
         first.rate = double(GST_VIDEO_INFO_FPS_N(&seen)) / GST_VIDEO_INFO_FPS_D(&seen);
       known = true;
-      kept = caps_of(format, first.picture);
+      kept = caps_of(like_this, first.picture);
       wanted = choose(first);
       left.first = std::max(0, wanted.first / kAround * kAround - kAround);
       const int end = (wanted.first + wanted.count + 2 * kAround - 1) / kAround * kAround;
       left.count = std::min(height, end) - left.first;
     }
+    // GStreamer 1.22 takes samples of full range as they are for those of limited range, and the
+    // other way round, unless R, G and B are between them.
+    const bool other_range = !GST_VIDEO_INFO_IS_RGB(&seen) &&
+                             !GST_VIDEO_INFO_IS_RGB(&first.picture) &&
+                             seen.colorimetry.range != first.picture.colorimetry.range;
+    const CapsPtr way(other_range ? gst_caps_from_string("video/x-raw,format=ARGB64")
+                                  : gst_caps_new_any());
+    g_object_set(between.get(), "caps", way.get(), nullptr);
     g_object_set(format.get(), "caps", kept.get(), nullptr);
     g_object_set(element.get(), "top", left.first, "bottom", height - left.first - left.count,
                  nullptr);
@@ -193,7 +201,8 @@ FrameReader::~FrameReader() {
 // The next file, or all pictures.
 void FrameReader::open() {
   const std::string end =
-      " ! videocrop name=crop ! videoconvert ! capsfilter name=format ! "
+      " ! videocrop name=crop ! videoconvert ! capsfilter name=between ! videoconvert ! "
+      "capsfilter name=format ! "
       "appsink name=sink sync=false max-buffers=2";
   if (pictures_) {
     const std::string type = media_type_of(files_.front());
@@ -208,6 +217,7 @@ void FrameReader::open() {
   {
     const std::lock_guard held(crop_->lock);
     crop_->element = element_of(pipeline_, "crop");
+    crop_->between = element_of(pipeline_, "between");
     crop_->format = element_of(pipeline_, "format");
   }
   if (!pictures_) g_object_set(source_.get(), "location", files_[next_file_++].c_str(), nullptr);

@@ -258,6 +258,68 @@ def files_of_other_colours(folder):
         assert f'format=(string){kept},' in caps, f'{files}: {caps}'
 
 
+def what_colours_mean(folder):
+    """It is that of the whole picture, and of the first file: not of a band, nor of a later one."""
+    # Nothing says it in this file. GStreamer takes BT.709 above 576 rows, and a band has fewer.
+    clip = folder / 'high.avi'
+    common.play('qdmdscenesrc scene=basic num-buffers=20 ! '
+                'video/x-raw,width=64,height=600,framerate=25/1 ! videoconvert ! '
+                'video/x-raw,format=I420 ! avenc_mpeg4 bitrate=4000000 ! avimux ! '
+                f'filesink location="{clip}"').set_state(Gst.State.NULL)
+    assert 'colorimetry' not in decoded(clip)[1].to_string()
+    backgrounds, _ = element_of_window(clip, 0, WINDOW, 'robust', 'background',
+                                       '! videoconvert ! video/x-raw,format=RGB')
+    for processes in (0, 2, 3):
+        run(folder, processes, clip, '--background', folder / 'h.png', '--cutout',
+            folder / 'h.mkv', '--window', WINDOW, '--quiet')
+        assert video(folder / 'h.png')[0][1] == backgrounds[-1], f'{processes} processes'
+        caps = decoded(folder / 'h.mkv')[1].to_string()
+        assert 'colorimetry=(string)bt709' in caps, f'{processes} processes: {caps}'
+
+    # White is 235 in the first file, 255 in the JPEGs, and what the first one has in the result.
+    def white(path, pixels, encoder):
+        end = {'.jpg': 'multifilesink', '.avi': 'avimux ! filesink',
+               '.mkv': 'matroskamux ! filesink'}[path.suffix]
+        common.play('videotestsrc pattern=white num-buffers=6 ! '
+                    'video/x-raw,format=RGB,width=48,height=36,framerate=25/1 ! videoconvert ! '
+                    f'video/x-raw,format={pixels} ! {encoder} ! {end} location="{path}"'
+                    ).set_state(Gst.State.NULL)
+
+    white(folder / 'limited.mkv', 'I420,colorimetry=bt601', 'avenc_ffv1')
+    white(folder / 'full.avi', 'I420,colorimetry=1:4:0:0', 'jpegenc quality=100')
+    whites = folder / 'whites'
+    whites.mkdir()
+    white(whites / 'a%02d.jpg', 'I420,colorimetry=1:4:0:0', 'jpegenc quality=100')
+    white(whites / 'b%02d.jpg', 'GRAY8', 'jpegenc quality=100')
+    for recordings, level in ((('limited.mkv', 'full.avi'), 235), (('full.avi', 'limited.mkv'), 255),
+                              (('whites',), 255)):
+        run(folder, 2, *(folder / name for name in recordings), '--background', folder / 'w.mkv',
+            '--window', 6, '--quiet')
+        frames = [frame[:48 * 36] for _, frame in video(folder / 'w.mkv')]
+        assert len(frames) == 12 and all(abs(min(frame) - level) <= 1 for frame in frames), \
+            f'{recordings}: {[(min(frame), max(frame)) for frame in frames]}'
+    # Grey pictures may come first.
+    white(whites / '0%02d.jpg', 'GRAY8', 'jpegenc quality=100')
+    run(folder, 0, whites, '--background', folder / 'w.mkv', '--window', 6, '--quiet')
+    assert 'format=(string)BGRx' in decoded(folder / 'w.mkv')[1].to_string()
+
+    # How pixels are shown.
+    clip = folder / 'fields.mkv'
+    make_clip(clip, 12, encoder='capssetter caps=video/x-raw,interlace-mode=interleaved,'
+              'field-order=top-field-first,pixel-aspect-ratio=4/3 ! avenc_ffv1')
+    def shown(path, *fields):
+        structure = decoded(path)[1].get_structure(0)
+        return [structure.get_fraction(field)[1:] if field == 'pixel-aspect-ratio'
+                else structure.get_string(field) for field in fields]
+
+    mode, shape = shown(clip, 'interlace-mode', 'pixel-aspect-ratio')
+    assert mode == 'interleaved' and shape[0] > shape[1], (mode, shape)
+    run(folder, 2, clip, '--cutout', folder / 's.mkv', '--mask', folder / 'sm.mkv', '--window', 12,
+        '--quiet')
+    assert shown(folder / 's.mkv', 'interlace-mode', 'pixel-aspect-ratio') == [mode, shape]
+    assert shown(folder / 'sm.mkv', 'pixel-aspect-ratio') == [shape]
+
+
 def rows_that_share_samples(folder):
     """Bands begin with them, in low pictures, too."""
     for width, height in ((33, 7), (64, 96), (97, 49), (5, 100)):
@@ -612,7 +674,7 @@ def main():
              for method in ('qdmd', 'dmd', 'robust')]
     cases += [(check.__name__.replace('_', ' '), check)
               for check in (colours_of_recordings, files_of_other_colours,
-                            rows_that_share_samples,
+                            rows_that_share_samples, what_colours_mean,
                             files_and_pictures, more_outputs, killed_and_resumed,
                             killed_while_parts_are_removed, resumed_with_other_options,
                             what_is_read_stays, pictures_that_are_odd,
