@@ -206,7 +206,7 @@ def model_table(found, decode):
     for method in ('qdmd', 'robust'):
         head += [f'`{method}`, s a frame without a network', '1 Gbit/s', '10 Gbit/s']
     text = (f'Decoding: {1000 * decode:.0f} ms a frame of {MODEL_WIDTH}x{MODEL_HEIGHT} on one core, '
-            f'by every machine; inner products with a window of '
+            'by every machine; inner products with a window of '
             f'{MODEL_WINDOW} frames {pixels * product * MODEL_WINDOW:.2f} s, the rest '
             f'{work["qdmd"] - pixels * product * MODEL_WINDOW:.2f} s (`qdmd`) and '
             f'{work["robust"]:.2f} s (`robust`), which machines divide.')
