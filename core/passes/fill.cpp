@@ -249,20 +249,15 @@ size_t run_of(int snapshots, bool deep) {
   return (units - 1) / 2 * 2 * kUnit + kUnit;
 }
 
+// Of a run. Vectors of bits are read whole, also at the end.
+size_t bits_size(size_t run) { return run / 8 + kUnit; }
+
 }  // namespace
-
-WindowMask::WindowMask(int capacity, size_t pixels)
-    // Vectors of bits are read whole, also at the end.
-    : stride_(mask_bytes(pixels)), bits_(stride_ * static_cast<size_t>(capacity) + kUnit, 0) {}
-
-uint64_t WindowMask::bytes(int capacity, size_t pixels) {
-  return uint64_t{mask_bytes(pixels)} * static_cast<uint64_t>(capacity) + kUnit;
-}
 
 uint64_t Filler::bytes(int snapshots, bool deep) {
   const auto m = static_cast<uint64_t>(std::max(snapshots, 1));
   const uint64_t run = run_of(snapshots, deep), size = deep ? 2 : 1;
-  return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + size) * run +
+  return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + size) * run + bits_size(run) +
          m * kChannels * sizeof(uint8_t*);
 }
 
@@ -271,6 +266,7 @@ Filler::Filler(int snapshots, bool deep) : run_(run_of(snapshots, deep)) {
   keep_.resize(m * run_);
   masked_.resize(run_);
   spread_.resize((deep ? 2 : 1) * run_);
+  bits_.resize(bits_size(run_));
   // One row more for the level.
   if (deep)
     list_rows(m * kChannels, &deep_samples_, &deep_planes_);
@@ -294,7 +290,8 @@ void Filler::take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& 
   for (size_t t = 0; t < m; ++t) {
     uint8_t* keep = keep_.data() + t * run_;
     const int snapshot = static_cast<int>(t), next = std::min(snapshot + 1, snapshots.size() - 1);
-    HWY_DYNAMIC_DISPATCH(expand_bits)(mask.of(snapshot) + first / 8, padded, keep, masked_.data());
+    mask.read(snapshot, first, padded, bits_.data());
+    HWY_DYNAMIC_DISPATCH(expand_bits)(bits_.data(), padded, keep, masked_.data());
     for (size_t c = 0; c < kChannels; ++c) {
       const float gain = gains[t][c];
       take(snapshot, next, keep, static_cast<int>(c), gain == 1 ? 1 : 1 / gain,

@@ -3,30 +3,12 @@
 
 #include <vector>
 
-#include "core/base/large_vector.h"
 #include "core/gram/window.h"
 #include "core/passes/mask.h"
 #include "core/passes/sampling.h"
+#include "core/passes/window_mask.h"
 
 namespace qdmd {
-
-// The masks of a window's snapshots, one after another.
-class WindowMask {
- public:
-  WindowMask() = default;
-  WindowMask(int capacity, size_t pixels);
-  static uint64_t bytes(int capacity, size_t pixels);
-  uint64_t bytes() const { return bits_.capacity(); }
-
-  uint8_t* of(int snapshot) { return bits_.data() + static_cast<size_t>(snapshot) * stride_; }
-  const uint8_t* of(int snapshot) const {
-    return bits_.data() + static_cast<size_t>(snapshot) * stride_;
-  }
-
- private:
-  size_t stride_ = 0;
-  LargeVector<uint8_t> bits_;
-};
 
 // Fills runs of pixels of all snapshots. One for each thread.
 class Filler {
@@ -69,6 +51,7 @@ class Filler {
   std::vector<const uint16_t*> deep_planes_;
   std::vector<uint16_t> masked_;  // snapshots, of each pixel
   std::vector<uint8_t> spread_;   // a row of samples that pixels share, or of their two digits
+  std::vector<uint8_t> bits_;     // of a snapshot's mask
 };
 
 // Every step-th pixel in x and y of one frame in unit light, the reference's where it is masked,

@@ -41,7 +41,7 @@ struct Solve {
   PlaneSlots shared;
   StableFrames stable;
   ReferencePicture reference;
-  std::vector<uint8_t> spread, reach, scratch;
+  std::vector<uint8_t> spread, reach, scratch, bits;
   WindowMask mask;
   Filler filler;
   int turn = 0;
@@ -76,7 +76,10 @@ struct Solve {
     reference.threshold.assign(size.pixels(), 12);
     find_median();
     share_chroma();
-    for (int t = 0; t < size.window; ++t) find_mask_of(t);
+    bits.resize(mask_bytes(size.pixels()));
+    mask.find_all(size.window, &pool, [this](int t, size_t, uint8_t* out) {
+      find_mask(reference, x(t).data(), kSameLight, out, scratch.data());
+    });
   }
 
   std::array<const uint8_t*, 3> x(int t) const {
@@ -105,7 +108,7 @@ struct Solve {
     median_picture(grid, stable, of, &pool, background, spread.data());
   }
   void find_mask_of(int t) {
-    find_mask(reference, x(t).data(), kSameLight, mask.of(t), scratch.data());
+    find_mask(reference, x(t).data(), kSameLight, bits.data(), scratch.data());
   }
   int next() { return turn = (turn + 1) % size.window; }
 };
@@ -190,7 +193,8 @@ void add_all(const Size& size) {
       [](Solve& solve) {
         const int t = solve.next();
         uint8_t* const out[3] = {solve.spread.data(), solve.spread.data(), solve.spread.data()};
-        fill_samples(solve.reference, solve.mask.of(t), solve.x(t).data(), kSameLight,
+        solve.mask.read(t, solve.bits.data());
+        fill_samples(solve.reference, solve.bits.data(), solve.x(t).data(), kSameLight,
                      solve.reach.data(), 4, out);
       });
   add("fill", size, "ns/pixel", all_pixels, [](Solve& solve) {

@@ -289,12 +289,13 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
             level.resize(pixels);
             fill_randomly(level, 255);
           }
-          WindowMask mask(snapshots, pixels);
+          std::vector<std::vector<uint8_t>> bits(static_cast<size_t>(snapshots),
+                                                 std::vector<uint8_t>(mask_bytes(pixels)));
           std::vector<Gain> gains;
           for (int t = 0; t < snapshots; ++t) {
             window.append();
             gains.push_back(t % 3 == 0 ? kSameLight : t % 3 == 1 ? Gain{2, 2, 2} : Gain{.5, 1, 2});
-            std::fill_n(mask.of(t), mask_bytes(pixels), uint8_t{0});
+            std::vector<uint8_t>& of_snapshot = bits[static_cast<size_t>(t)];
             for (size_t p = 0; p < pixels; ++p) {
               // Most are near the reference, some are not; some pixels are masked in all.
               for (size_t c = 0; c < 3; ++c)
@@ -304,9 +305,17 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
                                                           2.0f * static_cast<float>(rng() % 3),
                                                       0.0f, 255.0f));
               if (rng() % 4 == 0 || p % 50 == 7)
-                mask.of(t)[p / 8] = static_cast<uint8_t>(mask.of(t)[p / 8] | 1 << p % 8);
+                of_snapshot[p / 8] = static_cast<uint8_t>(of_snapshot[p / 8] | 1 << p % 8);
             }
           }
+          Pool pool(1);
+          WindowMask mask(snapshots, pixels);
+          mask.find_all(snapshots, &pool, [&](int t, size_t, uint8_t* out) {
+            std::copy_n(bits[static_cast<size_t>(t)].data(), mask_bytes(pixels), out);
+          });
+          const auto masked = [&](int t, size_t p) {
+            return is_masked(bits[static_cast<size_t>(t)].data(), p);
+          };
           std::vector<uint8_t> reach((pixels + 63) / 64 * 64);
           for (auto& r : reach) r = static_cast<uint8_t>(rng() % 12);
           Filler filler(snapshots, true);
@@ -322,14 +331,14 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
                   const float factor = 1 / gains[static_cast<size_t>(t)][c];
                   const double sample = all.sample(t, static_cast<int>(c), p) * factor;
                   own.push_back(static_cast<int>(std::min<double>(sample + 0.5, most)));
-                  if (!is_masked(mask.of(t), p)) kept.push_back(own.back());
+                  if (!masked(t, p)) kept.push_back(own.back());
                 }
                 std::sort(kept.begin(), kept.end());
                 int middle = (2 * reference.level[c][p] + 1) << low_bits >> 1;
                 if (!kept.empty())
                   middle = (kept[(kept.size() - 1) / 2] + kept[kept.size() / 2]) / 2;
                 for (int t = 0; t < snapshots; ++t) {
-                  const int limit = is_masked(mask.of(t), p) ? 0 : reach[p] << low_bits;
+                  const int limit = masked(t, p) ? 0 : reach[p] << low_bits;
                   ASSERT_EQ(filled[3 * static_cast<size_t>(t) + c][p - first],
                             std::clamp(own[static_cast<size_t>(t)], middle - limit, middle + limit))
                       << low_bits << " bits, snapshot " << t << " of " << snapshots;

@@ -157,12 +157,58 @@ TEST(ForegroundMask, TheSameFrameHasNone) {
   for (uint8_t bits : mask_of(c, kSameLight)) EXPECT_EQ(bits, 0);
 }
 
+// ---- Masks of a window ----
+
+// Whatever is kept of masks, they are read as they were found; what was found before is gone.
+TEST(WindowMask, ReadsWhatWasFound) {
+  std::mt19937 rng(49);
+  for (size_t pixels : {size_t{1}, size_t{63}, size_t{64}, size_t{65}, size_t{4096}, size_t{4097},
+                        size_t{10007}, size_t{64 * 64 * 3}}) {
+    constexpr int kSnapshots = 7;
+    const size_t bytes = mask_bytes(pixels);
+    Pool pool(3);
+    WindowMask mask(kSnapshots, pixels);
+    for (int round = 0; round < 4; ++round) {
+      // One is empty, one is set everywhere; others are empty in most places.
+      std::vector<std::vector<uint8_t>> bits(kSnapshots, std::vector<uint8_t>(bytes));
+      for (int t = 0; t < kSnapshots; ++t)
+        for (size_t p = 0; p < pixels; ++p) {
+          const unsigned share = t == 0 ? 0 : t == 1 ? 64 : 1u << (t - 2);
+          if (t == 1 || rng() % (64 * 64) < share * share)
+            bits[static_cast<size_t>(t)][p / 8] |= static_cast<uint8_t>(1 << p % 8);
+        }
+      const int count = kSnapshots - round;
+      mask.find_all(count, &pool, [&](int t, size_t worker, uint8_t* out) {
+        ASSERT_LT(worker, pool.threads());
+        std::copy(bits[static_cast<size_t>(t)].begin(), bits[static_cast<size_t>(t)].end(), out);
+      });
+      for (int t = 0; t < count; ++t) {
+        const auto& expected = bits[static_cast<size_t>(t)];
+        BeforeTheEdge<uint8_t> whole(bytes);
+        mask.read(t, whole.data());
+        ASSERT_TRUE(std::equal(expected.begin(), expected.end(), whole.data()))
+            << pixels << " pixels, snapshot " << t;
+        for (int part = 0; part < 20; ++part) {
+          const size_t first = rng() % (bytes / 8) * 8,
+                       count_of = 8 * (1 + rng() % ((bytes - first) / 8));
+          BeforeTheEdge<uint8_t> some(count_of);
+          mask.read(t, 8 * first, 8 * count_of, some.data());
+          ASSERT_TRUE(std::equal(some.data(), some.data() + count_of,
+                                 expected.begin() + static_cast<ptrdiff_t>(first)))
+              << pixels << " pixels, snapshot " << t << ", from byte " << first;
+        }
+      }
+    }
+  }
+}
+
 // ---- Filling ----
 
 // Snapshots of one scene with noise, masked in places.
 struct MaskedWindow {
   Window window;
-  WindowMask mask;
+  std::vector<std::vector<uint8_t>> bits;  // of snapshots
+  WindowMask mask;                         // the same
   std::vector<Gain> gains;
   ReferencePicture reference;
   std::vector<uint8_t> reach;
@@ -171,7 +217,10 @@ struct MaskedWindow {
   // snapshots, in all but one, in all but two.
   MaskedWindow(int count, int pixels, int share, const std::vector<float>& lights,
                std::mt19937& rng, int most_noise = 60)
-      : window(count, static_cast<size_t>(pixels)), mask(count, static_cast<size_t>(pixels)) {
+      : window(count, static_cast<size_t>(pixels)),
+        bits(static_cast<size_t>(count),
+             std::vector<uint8_t>(mask_bytes(static_cast<size_t>(pixels)))),
+        mask(count, static_cast<size_t>(pixels)) {
     reference.width = pixels;
     reference.height = 1;
     for (auto& plane : reference.level) plane = random_picture(static_cast<size_t>(pixels), rng);
@@ -191,13 +240,21 @@ struct MaskedWindow {
       }
       for (int p = 0; p < pixels; ++p)
         if (p < 3 ? t >= p : static_cast<int>(rng() % 100) < share)
-          mask.of(t)[p / 8] = static_cast<uint8_t>(mask.of(t)[p / 8] | 1 << p % 8);
+          of(t)[p / 8] = static_cast<uint8_t>(of(t)[p / 8] | 1 << p % 8);
     }
+    Pool pool(2);
+    mask.find_all(count, &pool, [&](int t, size_t, uint8_t* out) {
+      std::copy(bits[static_cast<size_t>(t)].begin(), bits[static_cast<size_t>(t)].end(), out);
+    });
     reach.assign(window.plane_size(), 0);
     for (int p = 0; p < pixels; ++p)
       reach[static_cast<size_t>(p)] = static_cast<uint8_t>(rng() % 256);
   }
 
+  uint8_t* of(int t) { return bits[static_cast<size_t>(t)].data(); }
+  bool is_masked(int t, size_t p) const {
+    return qdmd::is_masked(bits[static_cast<size_t>(t)].data(), p);
+  }
   uint8_t unit(int t, size_t c, size_t p) const {
     const float gain = gains[static_cast<size_t>(t)][c];
     const uint8_t sample = window.plane(t, static_cast<int>(c))[p];
@@ -206,14 +263,14 @@ struct MaskedWindow {
   int level(size_t c, size_t p) const {
     std::vector<int> samples;
     for (int t = 0; t < window.size(); ++t)
-      if (!is_masked(mask.of(t), p)) samples.push_back(unit(t, c, p));
+      if (!is_masked(t, p)) samples.push_back(unit(t, c, p));
     if (samples.empty()) return reference.level[c][p];
     std::sort(samples.begin(), samples.end());
     return (samples[(samples.size() - 1) / 2] + samples[samples.size() / 2]) / 2;
   }
   // median: level(c, p).
   int filled(int t, size_t c, size_t p, bool draw, int median) const {
-    if (is_masked(mask.of(t), p)) return median;
+    if (is_masked(t, p)) return median;
     if (!draw) return unit(t, c, p);
     return median + std::clamp<int>(unit(t, c, p) - median, -reach[p], reach[p]);
   }

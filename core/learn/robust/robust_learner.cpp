@@ -137,7 +137,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                          std::max<uint64_t>({light_of_bytes(grid_, threads),
                                              stable_frames_bytes(grid_, looks, threads),
                                              pixels() + blur_bytes(reference_.width, threads)});
-  const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height);
+  const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height) +
+                         WindowMask::scratch_bytes(pixels(), threads);
   const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
   return kept + made + scene +
          std::max({start, masks, scene,
@@ -377,9 +378,8 @@ void RobustLearner::find_foreground(const SnapshotRange& snapshots) {
   const size_t scratch_size = mask_scratch_bytes(reference_.width, reference_.height);
   const auto scratch =
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * room_.pool->threads());
-  room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
-    const int t = static_cast<int>(part);
-    find_mask(reference_, snapshots.picture(t), gains_[part], mask_.of(t),
+  mask_.find_all(snapshots.size(), room_.pool, [&](int t, size_t worker, uint8_t* bits) {
+    find_mask(reference_, snapshots.picture(t), gains_[static_cast<size_t>(t)], bits,
               scratch.get() + worker * scratch_size);
   });
 }
@@ -389,11 +389,15 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
     const Clock::Span span(*room_.clock, Clock::samples);
     samples_.clear();
     while (samples_.size() < snapshots.size()) samples_.append();
-    room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part) {
+    const size_t size = mask_bytes(pixels());
+    const auto bits = std::make_unique_for_overwrite<uint8_t[]>(size * room_.pool->threads());
+    room_.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
       const int t = static_cast<int>(part), slot = samples_.slot(t);
+      uint8_t* const own_bits = bits.get() + worker * size;
+      mask_.read(t, own_bits);
       uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                                samples_.plane(slot, 2)};
-      fill_samples(reference_, mask_.of(t), snapshots.picture(t), gains_[part], reach_.data(),
+      fill_samples(reference_, own_bits, snapshots.picture(t), gains_[part], reach_.data(),
                    sampled_rows(), out);
     });
     gram_.add_newest(samples_, samples_.size());
