@@ -19,6 +19,8 @@ constexpr double kLeastNoise = 1.0;
 // it ends at 0.385 standard deviations.
 constexpr double kLowerPart = 0.3, kLowerEnd = 0.385;
 constexpr float kOutside = 1e6f;
+// Unknown: gain, offset, the shift, and the turn and the growth of half a picture.
+constexpr int kUnknown = 6;
 // Pixels along the border where there is none.
 constexpr int kBorder = 2;
 
@@ -184,11 +186,13 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
   if (count_ < kFewest) return fit;
   read(frame, pose, light);
   fit.noise = noise > 0 ? noise : noise_of_residuals();
+  return turns ? solved<kUnknown>(fit) : solved<kUnknown - 2>(fit);
+}
 
-  // Unknown: gain, offset, the shift, and the turn and the growth of half a picture.
-  constexpr int kUnknown = 6;
-  std::array<std::array<float, kUnknown + 1>, kUnknown> sums{};
-  const int unknown = turns ? kUnknown : 4;
+// How many are free is known to the compiler, which keeps the sums of few in registers.
+template <int kFree>
+Fit Landmarks::solved(Fit fit) const {
+  std::array<std::array<float, kFree + 1>, kFree> sums{};
   const Point middle = middle_of(width_, height_);
   const auto half = static_cast<float>(std::max(1.0, std::max(middle.x, middle.y)));
   const auto middle_x = static_cast<float>(middle.x), middle_y = static_cast<float>(middle.y);
@@ -207,18 +211,16 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
     squares += weight * e * e;
     const float u = (static_cast<float>(x_[i]) - middle_x) / half,
                 v = (static_cast<float>(y_[i]) - middle_y) / half;
-    const float row[kUnknown + 1] = {level_[i] - 128,
-                                     1,
-                                     right_[i],
-                                     down_[i],
-                                     right_[i] * u + down_[i] * v,
-                                     down_[i] * u - right_[i] * v,
-                                     e};
-    for (int a = 0; a < unknown; ++a) {
+    const float row[kUnknown] = {level_[i] - 128,
+                                 1,
+                                 right_[i],
+                                 down_[i],
+                                 right_[i] * u + down_[i] * v,
+                                 down_[i] * u - right_[i] * v};
+    for (size_t a = 0; a < kFree; ++a) {
       const float weighted = weight * row[a];
-      for (int b = a; b < unknown; ++b)
-        sums[static_cast<size_t>(a)][static_cast<size_t>(b)] += weighted * row[b];
-      sums[static_cast<size_t>(a)][kUnknown] += weighted * e;
+      for (size_t b = a; b < kFree; ++b) sums[a][b] += weighted * row[b];
+      sums[a][kFree] += weighted * e;
     }
   }
   // Of normal noise it is 0.87.
@@ -227,21 +229,21 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
   if (fitting < kFewest || inside < count_ / 4) return fit;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kUnknown, kUnknown>;
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kUnknown, 1>;
-  Matrix normal(unknown, unknown);
-  Vector right(unknown);
-  for (int a = 0; a < unknown; ++a) {
-    for (int b = a; b < unknown; ++b)
+  Matrix normal(kFree, kFree);
+  Vector right(kFree);
+  for (int a = 0; a < kFree; ++a) {
+    for (int b = a; b < kFree; ++b)
       normal(a, b) = normal(b, a) =
           static_cast<double>(sums[static_cast<size_t>(a)][static_cast<size_t>(b)]);
-    right(a) = static_cast<double>(sums[static_cast<size_t>(a)][kUnknown]);
+    right(a) = static_cast<double>(sums[static_cast<size_t>(a)][kFree]);
   }
   // What no landmark tells stays as it is.
-  for (int a = 0; a < unknown; ++a) normal(a, a) += 1e-3 * weights * (a == 0 ? 1 : 0) + 1e-6;
+  for (int a = 0; a < kFree; ++a) normal(a, a) += 1e-3 * weights * (a == 0 ? 1 : 0) + 1e-6;
   const Eigen::LDLT<Matrix> factors(normal);
   if (factors.info() != Eigen::Success || !(factors.vectorD().minCoeff() > 0)) return fit;
   const Vector solution = factors.solve(right);
   if (!solution.allFinite()) return fit;
-  Vector unit = Vector::Zero(unknown);
+  Vector unit = Vector::Zero(kFree);
   double variance = 0;
   for (int a : {2, 3}) {
     unit.setZero();
@@ -253,12 +255,12 @@ Fit Landmarks::step(const GreyView& frame, const Pose& pose, const GreyLight& li
   fit.light.offset += solution(1);
   Pose step;
   step.x = solution(2), step.y = solution(3);
-  if (turns) {
+  if constexpr (kFree == kUnknown) {
     step.scale = std::hypot(1 + solution(4) / half, solution(5) / half);
     step.angle = std::atan2(solution(5) / half, 1 + solution(4) / half);
   }
   // The frame, at the pose, shows the landmarks' picture at step(p): frame(A p) = picture(step p).
-  fit.pose = compose(step, pose);
+  fit.pose = compose(step, fit.pose);
   fit.known = true;
   return fit;
 }

@@ -62,6 +62,8 @@ class Landmarks {
  private:
   void read(const GreyView& frame, const Pose& pose, const GreyLight& light);
   double noise_of_residuals() const;
+  template <int kFree>
+  Fit solved(Fit fit) const;
 
   int most_, count_ = 0, width_ = 0, height_ = 0;
   std::vector<int32_t> x_, y_;
