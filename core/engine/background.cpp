@@ -138,26 +138,40 @@ void Background::rehearse(const MaskWishes& wishes) {
   std::vector<uint8_t> room((deep ? 2 : 1) * spread);
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
-    Comparison frame = {
-        {},    &model,          foreground.threshold, fixed ? nullptr : model.limits(),
-        fixed, &wishes.ignored, wishes.shadows};
-    read_planes(snapshots_->picture(t), room.data(), frame.x);
-    if (deep) read_planes(whole.low_picture(t), room.data() + spread, frame.low);
-    decision_.decide(frame, room_.pool);
+    const PlaneRows x(snapshots_->picture(t), room.data());
+    const PlaneRows low =
+        deep ? PlaneRows(whole.low_picture(t), room.data() + spread) : PlaneRows();
+    decide({{},
+            &model,
+            foreground.threshold,
+            fixed ? nullptr : model.limits(),
+            fixed,
+            &wishes.ignored,
+            wishes.shadows},
+           x, deep ? &low : nullptr, room_.pool);
   }
 }
 
-void Background::decide(const uint8_t* const x[3], const uint8_t* const low[3], Pool* pool) {
+void Background::decide(const PlaneRows& x, const PlaneRows* low, Pool* pool) {
   const bool fixed = wishes_.threshold > 0;
-  decision_.decide({{x[0], x[1], x[2]},
-                    &model(),
-                    report_.foreground.threshold,
-                    fixed ? nullptr : model().limits(),
-                    fixed,
-                    &wishes_.ignored,
-                    wishes_.shadows,
-                    {low[0], low[1], low[2]}},
-                   pool);
+  decide({{},
+          &model(),
+          report_.foreground.threshold,
+          fixed ? nullptr : model().limits(),
+          fixed,
+          &wishes_.ignored,
+          wishes_.shadows},
+         x, low, pool);
+}
+
+void Background::decide(Comparison frame, const PlaneRows& x, const PlaneRows* low, Pool* pool) {
+  for (int c = 0; c < kChannels; ++c) {
+    frame.x[c] = x.plane(c);
+    frame.low[c] = low ? low->plane(c) : nullptr;
+  }
+  frame.rows = &x;
+  frame.low_rows = low;
+  decision_.decide(frame, pool);
 }
 
 void Background::publish() {

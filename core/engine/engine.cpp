@@ -202,7 +202,7 @@ OutputTask Engine::next_task(Output output) {
   const int index = frames_.size() - queue_.pending, slot = frames_.slot(index);
   schedule_->show(index);
   OutputTask task = task_of(output);
-  if (output != Output::background) read_next(slot, &task);
+  if (output != Output::background) name_planes(slot, &task);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
   if (frames_.low_bits() > 0) {
@@ -212,24 +212,29 @@ OutputTask Engine::next_task(Output output) {
   return task;
 }
 
+// Where their samples are, or are going to be.
+void Engine::name_planes(int slot, OutputTask* task) {
+  next_ = PlaneRows(frames_.window().picture(slot), next_chroma_.get());
+  for (int c = 0; c < kChannels; ++c) task->x[c] = next_.plane(c);
+  if (frames_.low_bits() == 0) return;
+  next_low_ = PlaneRows(frames_.low_picture(slot),
+                        next_chroma_.get() + room_for_planes(frames_.window().shape()));
+  for (int c = 0; c < kChannels; ++c) task->low[c] = next_low_.plane(c);
+}
+
 // Where pixels share samples, once a frame.
-void Engine::read_next(int slot, OutputTask* task) {
-  const bool deep = frames_.low_bits() > 0;
-  if (!read_) {
-    Pool* const pool = workers_->idle_pool();
-    read_planes(frames_.window().picture(slot), next_chroma_.get(), next_, pool);
-    uint8_t* const room = next_chroma_.get() + room_for_planes(frames_.window().shape());
-    if (deep) read_planes(frames_.low_picture(slot), room, next_low_, pool);
-  }
+void Engine::read_next() {
+  if (!read_) next_.read_all(workers_->idle_pool());
+  if (!read_ && frames_.low_bits() > 0) next_low_.read_all(workers_->idle_pool());
   read_ = true;
-  std::copy_n(next_, kChannels, task->x);
-  if (deep) std::copy_n(next_low_, kChannels, task->low);
 }
 
 // Once a frame.
 void Engine::decide_next(OutputTask* task) {
-  if (!decided_) background_->decide(task->x, task->low, workers_->idle_pool());
-  decided_ = true;
+  if (!decided_)
+    background_->decide(next_, frames_.low_bits() > 0 ? &next_low_ : nullptr,
+                        workers_->idle_pool());
+  decided_ = read_ = true;
   task->mask = background_->decision().mask();
   task->shaded = background_->decision().shaded();
 }
@@ -348,7 +353,10 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
   flushed_if_it_throws([&] {
     OutputTask task = next_task(output);
     const bool masked = output == Output::mask || output == Output::cutout;
-    if (masked) decide_next(&task);
+    if (masked)
+      decide_next(&task);
+    else if (output != Output::background)
+      read_next();
     if (decided_ && !masked && !out.bits.is_deep()) {
       background_->decision().level(0, task.level);
       task.level_stride = background_->decision().level_stride();

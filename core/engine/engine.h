@@ -154,7 +154,8 @@ class Engine {
   OutputTask task_of(Output output);
   OutputTask next_task(Output output);
   void return_to_frame(OutputTask* task, bool level);
-  void read_next(int slot, OutputTask* task);
+  void name_planes(int slot, OutputTask* task);
+  void read_next();
   void decide_next(OutputTask* task);
   void soften(const Levels& levels, OutputTask* task);
   void pass_wishes();
@@ -180,7 +181,7 @@ class Engine {
   Queue queue_;
   // Of the frame that leaves next.
   bool decided_ = false, softened_ = false, read_ = false;
-  const uint8_t *next_[kChannels] = {}, *next_low_[kChannels] = {};
+  PlaneRows next_, next_low_;
   std::unique_ptr<uint8_t[]> next_chroma_;  // of each pixel, where pixels share samples
   // The last member: its threads end before what they work on.
   std::unique_ptr<Workers> workers_;

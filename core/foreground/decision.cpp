@@ -198,6 +198,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
   look();
+  // All are there now.
+  now_.frame.rows = now_.frame.low_rows = nullptr;
   if (now_.textures) {
     // The second frame is the first one that can differ from what was there before: it is looked
     // at again now that it is known what moves in it.
@@ -303,6 +305,8 @@ void Decision::look() {
 
 // L, and which pixels differ from it.
 void Decision::compare(int first_row, int row_count) {
+  if (now_.frame.rows) now_.frame.rows->read(first_row, row_count);
+  if (now_.frame.low_rows) now_.frame.low_rows->read(first_row, row_count);
   const auto width = static_cast<size_t>(shape_.width);
   for (int y = first_row; y < first_row + row_count; ++y) {
     for (size_t left = 0; left < width; left += kMaxRun) {

@@ -17,6 +17,7 @@
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
 #include "core/parallel/pool.h"
+#include "core/passes/read_samples.h"
 
 namespace qdmd {
 
@@ -40,6 +41,8 @@ struct Comparison {
   Shadows shadows = Shadows::background;
   // Of samples of more than 8 bits what is below the highest 8 of x; or nulls.
   const uint8_t* low[3] = {nullptr, nullptr, nullptr};
+  // What x and low are the planes of, if their rows are to be made; or nulls, if they are there.
+  const PlaneRows *rows = nullptr, *low_rows = nullptr;
 };
 
 // A pixel that differs from L is foreground unless

@@ -49,24 +49,39 @@ const uint8_t* read_low_samples(const SnapshotRange& snapshots, int index, int c
                       room);
 }
 
+PlaneRows::PlaneRows(const KeptPicture& picture, uint8_t* room)
+    : room_(room), shape_(picture.shape) {
+  std::copy_n(picture.plane, kChannels, shared_);
+  std::copy_n(picture.plane, kChannels, planes_);
+  for (size_t c = 1; c < kChannels && shape_.is_shared(); ++c)
+    planes_[c] = room + (c - 1) * shape_.pixels();
+}
+
+void PlaneRows::read(int first, int count) const {
+  if (!shape_.is_shared()) return;
+  const auto width = static_cast<size_t>(shape_.width);
+  const auto samples = static_cast<size_t>(shape_.chroma_width());
+  for (size_t c = 1; c < kChannels; ++c)
+    for (int y = first; y < first + count; ++y) {
+      const int shared = y / shape_.rows;
+      uint8_t* const row = room_ + (c - 1) * shape_.pixels() + static_cast<size_t>(y) * width;
+      // Rows that share samples are alike.
+      if (y > first && (y - 1) / shape_.rows == shared)
+        std::memcpy(row, row - width, width);
+      else
+        spread_samples(shared_[c] + static_cast<size_t>(shared) * samples, 1, 2, width, row);
+    }
+}
+
+void PlaneRows::read_all(Pool* pool) const {
+  if (!shape_.is_shared()) return;
+  for_rows(pool, shape_.height, shape_.pixels(), [&](int first, int count) { read(first, count); });
+}
+
 void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3], Pool* pool) {
-  std::copy_n(picture.plane, kChannels, planes);
-  const ChromaShape& shape = picture.shape;
-  if (!shape.is_shared()) return;
-  const auto width = static_cast<size_t>(shape.width);
-  const auto samples = static_cast<size_t>(shape.chroma_width());
-  for_rows(pool, shape.chroma_height(), shape.pixels(), [&](int first, int count) {
-    for (size_t c = 1; c < kChannels; ++c)
-      for (int shared = first; shared < first + count; ++shared) {
-        const int y = shared * shape.rows;
-        uint8_t* const row = room + (c - 1) * shape.pixels() + static_cast<size_t>(y) * width;
-        spread_samples(planes[c] + static_cast<size_t>(shared) * samples, 1, 2, width, row);
-        // Rows that share samples are alike.
-        for (int more = 1; more < shape.rows && y + more < shape.height; ++more)
-          std::memcpy(row + static_cast<size_t>(more) * width, row, width);
-      }
-  });
-  for (size_t c = 1; c < kChannels; ++c) planes[c] = room + (c - 1) * shape.pixels();
+  const PlaneRows rows(picture, room);
+  rows.read_all(pool);
+  for (int c = 0; c < kChannels; ++c) planes[c] = rows.plane(c);
 }
 
 void RowReader::read(int y, const uint8_t* rows[3]) {

@@ -27,6 +27,24 @@ inline size_t room_for_planes(const ChromaShape& shape) {
   return shape.is_shared() ? (kChannels - 1) * shape.pixels() : 0;
 }
 
+// The same planes, of which each row is made when a pass comes to it: it is still near then.
+class PlaneRows {
+ public:
+  PlaneRows() = default;
+  PlaneRows(const KeptPicture& picture, uint8_t* room);
+
+  const uint8_t* plane(int channel) const { return planes_[channel]; }
+  // Makes rows first .. first + count - 1, of picture.shape.height. Any threads may make different
+  // rows.
+  void read(int first, int count) const;
+  void read_all(Pool* pool) const;
+
+ private:
+  const uint8_t *shared_[kChannels] = {}, *planes_[kChannels] = {};
+  uint8_t* room_ = nullptr;
+  ChromaShape shape_;
+};
+
 // Reads rows of a picture, one after another.
 class RowReader {
  public:

@@ -95,14 +95,15 @@ class Batch {
     model.set_time(t);
     const Window& window = frames_.window();
     const int slot = frames_.slot(t);
-    const OutputTask task = {{window.plane(slot, 0), window.plane(slot, 1), window.plane(slot, 2)},
+    const PlaneRows x(window.picture(slot), nullptr);
+    const OutputTask task = {{x.plane(0), x.plane(1), x.plane(2)},
                              &model,
                              Output::mask,
                              background_.decision().mask(),
                              nullptr,
                              nullptr,
                              255};
-    background_.decide(task.x, task.low, &pool_);
+    background_.decide(x, nullptr, &pool_);
     const auto bands = static_cast<int>(std::max<size_t>(1, window.pixels() / kPixelsPerBand));
     for_bands(pool_, c_.height, bands, [&](int first, int count, size_t) {
       write_output(task, view_of(c_, out_.data()), first, count);
