@@ -493,8 +493,8 @@ def memory_of_processes(folder):
                 shares = [(whole - bare) / window for whole, bare in zip(most[frames], most[2])]
                 what = f'{method}, {pixels}, {processes} processes'
                 print(f'# {what}: ' + ' '.join(f'{share:.3f}' for share in shares), flush=True)
-                # A window in I420 is half as large; the masks of robust are as large as in RGB.
-                part = 1 if pixels == 'BGRx' else 0.5 if method == 'qdmd' else 0.6
+                # A window in I420 is half as large.
+                part = 1 if pixels == 'BGRx' else 0.5
                 assert max(shares) <= part * (1 / processes + 0.1), f'{what}: {shares}'
 
 
