@@ -151,13 +151,14 @@ void pack_bits(const uint8_t* samples, size_t count, uint8_t* bits) {
   const hn::CappedTag<uint8_t, 64> d;
   const size_t lanes = hn::Lanes(d);
   const auto zero = hn::Zero(d);
+  const size_t whole = 8 * mask_bytes(count);
   if (lanes < 8) {
-    std::memset(bits, 0, mask_bytes(count));
-    for (size_t i = 0; i < count; ++i)
+    std::memset(bits, 0, whole / 8);
+    for (size_t i = 0; i < whole; ++i)
       bits[i / 8] = static_cast<uint8_t>(bits[i / 8] | (samples[i] != 0) << i % 8);
     return;
   }
-  for (size_t i = 0; i < count; i += lanes)
+  for (size_t i = 0; i < whole; i += lanes)
     hn::StoreMaskBits(d, hn::Gt(hn::LoadU(d, samples + i), zero), bits + i / 8);
 }
 

@@ -89,6 +89,8 @@ std::vector<uint8_t> mask_of(const Case& c, const Gain& gain) {
   // Memory of its own, so that a byte too many is seen.
   BeforeTheEdge<uint8_t> bits(mask_bytes(c.reference.pixels()));
   BeforeTheEdge<uint8_t> scratch(mask_scratch_bytes(c.reference.width, c.reference.height));
+  // All of them are written.
+  std::fill(bits.begin(), bits.end(), uint8_t{255});
   find_mask(c.reference, c.x().data(), gain, bits.data(), scratch.data());
   return {bits.begin(), bits.end()};
 }

@@ -27,9 +27,9 @@ diff <({ printf "$root$folder/%s\n" "$@"; printf "$root%s\n" ${library[@]+"${lib
 "$tests/try_plugin.sh" "$root$folder"
 grep -F "GST_PLUGIN_PATH=$folder" "$build/meson-logs/meson-log.txt"
 
-if [ "${#library[@]}" -gt 0 ]; then
+pc=$(printf '%s\n' ${library[@]+"${library[@]}"} | grep 'qdmd[.]pc$' || true)
+if [ -n "$pc" ]; then
   echo "== a program that uses the library"
-  pc=$(printf '%s\n' "${library[@]}" | grep 'qdmd[.]pc$')
   # pkg-config puts the root in front of qdmd's folders and of OpenCV's.
   flags=$(PKG_CONFIG_PATH="$root$(dirname "$pc")" pkg-config --define-variable=prefix="$root$(dirname "$pc" | sed 's,/lib.*,,')" \
     --cflags --libs qdmd)
