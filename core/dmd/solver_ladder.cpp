@@ -74,9 +74,14 @@ std::vector<SpectrumMode> spectrum_of(const SnapshotFactor<double>& factor, DmdO
 // One window, which solvers try one after another.
 class Ladder {
  public:
-  Ladder(const SnapshotRange& snapshots, const QuaternionMatrixd& gram, const DmdOptions& options,
-         double pixels)
-      : snapshots_(snapshots), gram_(gram), options_(options), pixels_(pixels) {}
+  // distinct: distinct_snapshots() of all but the last one.
+  Ladder(const SnapshotRange& snapshots, const QuaternionMatrixd& gram, Index distinct,
+         const DmdOptions& options, double pixels)
+      : snapshots_(snapshots),
+        gram_(gram),
+        distinct_(distinct),
+        options_(options),
+        pixels_(pixels) {}
 
   BackgroundModes solve() {
     const DmdOptions asked = options_;
@@ -141,19 +146,21 @@ class Ladder {
     modes->summary.sensitivity = sensitivity(solved);
   }
 
-  // By Solver::gram. It cannot tell small singular values from zero: what it left out is found by a
-  // comparison with extended(), if `compare`, else anything may have been.
+  // By Solver::gram. It cannot tell small singular values from zero, but for those of frames that
+  // came twice: what else it left out is found by a comparison with extended(), if `compare`, else
+  // anything may have been.
   std::optional<BackgroundModes> from_gram(bool compare) {
     const auto factor = factorize_gram(gram_);
     auto modes = solve_factor(factor, options_);
     modes.summary.solver = Solver::gram;
     if (!usable(modes)) return std::nullopt;
-    const Index most = std::min<Index>(gram_.cols() - 1, static_cast<Index>(pixels_));
+    const Index most = std::min(distinct_, static_cast<Index>(pixels_));
     const bool low_rank =
         options_.estimator == Estimator::forward_backward || options_.estimator == Estimator::total;
     const Index wanted =
         options_.rank > 0 || low_rank ? std::min<Index>(std::max(1, options_.rank), most) : most;
-    const bool whole = modes.summary.rank >= wanted;
+    // More than there can be are rounding.
+    const bool whole = modes.summary.rank >= wanted && modes.summary.rank <= most;
     if (!whole && compare) return compared(std::move(modes));
     if (whole) set_bounds(factor, &modes);
     return modes;
@@ -193,6 +200,7 @@ class Ladder {
 
   const SnapshotRange& snapshots_;
   const QuaternionMatrixd& gram_;
+  Index distinct_;
   DmdOptions options_;
   double pixels_;
 };
@@ -202,9 +210,10 @@ class Ladder {
 BackgroundModes quaternion_modes(const SnapshotRange& snapshots, IntegerMatrix gram,
                                  const DmdOptions& options, double pixels) {
   const QuaternionMatrixd g = quaternion_gram(gram);
+  const int distinct = distinct_snapshots(gram, std::max(1, snapshots.size() - 1));
   gram.resize(0, 0);
   if (pixels == 0) pixels = static_cast<double>(snapshots.pixels());
-  return Ladder(snapshots, g, options, pixels).solve();
+  return Ladder(snapshots, g, distinct, options, pixels).solve();
 }
 
 }  // namespace qdmd

@@ -259,6 +259,22 @@ QuaternionMatrixd quaternion_gram(const IntegerMatrix& gram) {
   return g;
 }
 
+int distinct_snapshots(const IntegerMatrix& gram, int count) {
+  const auto product = [&](int s, int t) {
+    return gram.block<kChannels, kChannels>(kChannels * s, kChannels * t).trace();
+  };
+  int distinct = 0;
+  for (int t = 0; t < count; ++t) {
+    const int64_t square = product(t, t);
+    bool is_new = square > 0;
+    // |x - y|^2 = 0.
+    for (int s = 0; s < t && is_new; ++s)
+      is_new = product(s, s) != square || product(s, t) != square;
+    distinct += is_new;
+  }
+  return distinct;
+}
+
 Eigen::MatrixXd channel_gram(const IntegerMatrix& gram, int channel) {
   const Eigen::Index m = gram.rows() / kChannels;
   Eigen::MatrixXd g(m, m);

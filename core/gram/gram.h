@@ -101,6 +101,10 @@ class SlidingGram {
 // Every element is an integer below 2^53 for windows of less than 2^36 pixels, hence exact.
 QuaternionMatrixd quaternion_gram(const IntegerMatrix& gram);
 
+// How many of the first `count` snapshots are different from each other and not black: their rank
+// is at most that. Frames that come twice, and pictures that stand still, are told exactly.
+int distinct_snapshots(const IntegerMatrix& gram, int count);
+
 // The m x m Gram matrix of one channel alone (0 R, 1 G, 2 B), exact as above.
 Eigen::MatrixXd channel_gram(const IntegerMatrix& gram, int channel);
 

@@ -1,5 +1,6 @@
 #include "core/gram/gram.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/gram/kernel.h"
@@ -251,6 +252,44 @@ TEST(ChannelGram, IsTheGramOfOneChannel) {
       for (int p = 0; p < 40; ++p)
         x(p, t) = clip.at(static_cast<size_t>(t), static_cast<size_t>(c), static_cast<size_t>(p));
     EXPECT_EQ(channel_gram(gram, c), x.transpose() * x);  // integers again
+  }
+}
+
+TEST(DistinctSnapshots, AreCountedByTheirPixels) {
+  std::mt19937 rng(69);
+  for (int round = 0; round < 50; ++round) {
+    Clip clip = random_clip(40, 9, rng);
+    for (size_t t = 1; t < clip.frames.size(); ++t) {
+      const auto& other = clip.frames[rng() % t];
+      switch (rng() % 5) {
+        case 0:  // seen before
+          clip.frames[t] = other;
+          break;
+        case 1:  // but for one level
+          clip.frames[t] = other;
+          clip.frames[t][rng() % 120] ^= 1;
+          break;
+        case 2:  // as long, and another picture
+          clip.frames[t].assign(other.rbegin(), other.rend());
+          break;
+        case 3:
+          std::fill(clip.frames[t].begin(), clip.frames[t].end(), uint8_t{0});
+          break;
+        default:
+          break;
+      }
+    }
+    const auto gram = gram_of(to_window(clip));
+    int distinct = 0;
+    for (size_t count = 0; count <= clip.frames.size(); ++count) {
+      if (count > 0) {
+        const auto newest = clip.frames.begin() + static_cast<ptrdiff_t>(count) - 1;
+        const bool black = *newest == std::vector<uint8_t>(newest->size(), 0);
+        distinct += !black && std::find(clip.frames.begin(), newest, *newest) == newest;
+      }
+      EXPECT_EQ(distinct_snapshots(gram, static_cast<int>(count)), distinct)
+          << round << ' ' << count;
+    }
   }
 }
 

@@ -226,5 +226,38 @@ TEST(Solvers, PolynomialFadesHaveSmallResiduals) {
     }
 }
 
+// ---- Which solver `auto` takes below full rank ----
+
+TEST(Automatic, TakesTheGramMatrixWhereAllThatIsLeftOutCameTwice) {
+  std::mt19937 rng(10);
+  const Clip pictures = noisy_clip(200, 12, 3, rng);
+  Clip twice(200, 24), still(200, 10), lit(200, 10);
+  for (size_t t = 0; t < 24; ++t) twice.frames[t] = pictures.frames[t / 2];
+  for (size_t t = 0; t < 10; ++t) {
+    still.frames[t] = pictures.frames[0];
+    // Twice as bright: no frame comes again, and some depend on others.
+    lit.frames[t] = pictures.frames[t / 2];
+    for (uint8_t& level : lit.frames[t]) level = t % 2 == 0 ? level / 2 * 2 : level / 2;
+  }
+  DmdOptions options;
+  options.solver = Solver::automatic;
+  const auto solve_all = [&](const Clip& clip, Solver solver) {
+    options.solver = solver;
+    return quaternion_modes(to_window(clip), gram_of(to_window(clip)), options);
+  };
+  for (const auto& [clip, rank] : {std::pair{&twice, 12}, {&still, 1}}) {
+    const auto modes = solve_all(*clip, Solver::automatic);
+    const auto careful = solve_all(*clip, Solver::gram_extended);
+    EXPECT_EQ(modes.summary.solver, Solver::gram);
+    EXPECT_EQ(modes.summary.rank, rank);
+    EXPECT_EQ(careful.summary.rank, rank);
+    const double apart = background_distance(to_quaternions(*clip), modes, careful);
+    EXPECT_LE(apart, modes.summary.rounding_bound + careful.summary.rounding_bound);
+    // The Gram matrix has the square of the condition.
+    EXPECT_LE(apart, picture_tolerance(std::pow(modes.summary.condition, 2)));
+  }
+  EXPECT_EQ(solve_all(lit, Solver::automatic).summary.solver, Solver::gram_extended);
+}
+
 }  // namespace
 }  // namespace qdmd::test
