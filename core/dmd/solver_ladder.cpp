@@ -154,7 +154,10 @@ class Ladder {
     auto modes = solve_factor(factor, options_);
     modes.summary.solver = Solver::gram;
     if (!usable(modes)) return std::nullopt;
-    const Index most = std::min(distinct_, static_cast<Index>(pixels_));
+    // Other estimators work on more than X: pairs of frames may differ where frames do not.
+    const Index columns =
+        options_.estimator == Estimator::exact ? distinct_ : std::max<Index>(1, gram_.cols() - 1);
+    const Index most = std::min(columns, static_cast<Index>(pixels_));
     const bool low_rank =
         options_.estimator == Estimator::forward_backward || options_.estimator == Estimator::total;
     const Index wanted =

@@ -257,6 +257,10 @@ TEST(Automatic, TakesTheGramMatrixWhereAllThatIsLeftOutCameTwice) {
     EXPECT_LE(apart, picture_tolerance(std::pow(modes.summary.condition, 2)));
   }
   EXPECT_EQ(solve_all(lit, Solver::automatic).summary.solver, Solver::gram_extended);
+  // Equal frames tell nothing of pairs of them, which this estimator works on.
+  options.estimator = Estimator::total;
+  options.rank = 14;
+  EXPECT_EQ(solve_all(twice, Solver::automatic).summary.solver, Solver::gram_extended);
 }
 
 }  // namespace
