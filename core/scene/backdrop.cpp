@@ -156,16 +156,37 @@ Backdrop::Backdrop(int width, int height, int margin, const StreamSource& stream
   shop_window_ = intersection(canvas, kShopWindow.box(width, height, margin));
 }
 
-std::array<double, 3> Backdrop::mean(const Box& wanted) const {
+Box Backdrop::seen(const Box& wanted) const {
   const Box frame{0, 0, picture_.width - 2 * margin_, picture_.height - 2 * margin_};
   Box box = intersection(frame, wanted);
   if (box.empty()) box = frame;
+  return {box.x + margin_, box.y + margin_, box.width, box.height};
+}
+
+std::array<double, 3> Backdrop::mean(const Box& wanted) const {
+  const Box box = seen(wanted);
   std::array<double, 3> sum{};
   for (int y = box.y; y < box.bottom(); ++y)
     for (int x = box.x; x < box.right(); ++x)
-      for (size_t c = 0; c < 3; ++c) sum[c] += picture_.at(x + margin_, y + margin_)[c];
+      for (size_t c = 0; c < 3; ++c) sum[c] += picture_.at(x, y)[c];
   for (auto& value : sum) value /= static_cast<double>(box.width) * box.height;
   return sum;
+}
+
+double Backdrop::contrast(const Box& wanted) const {
+  const Box box = seen(wanted);
+  const std::array<double, 3> level = mean(wanted);
+  std::array<double, 3> squares{};
+  for (int y = box.y; y < box.bottom(); ++y)
+    for (int x = box.x; x < box.right(); ++x)
+      for (size_t c = 0; c < 3; ++c) {
+        const double off = picture_.at(x, y)[c] - level[c];
+        squares[c] += off * off;
+      }
+  double sum = 0;
+  for (const double value : squares)
+    sum += std::sqrt(value / (static_cast<double>(box.width) * box.height));
+  return sum / 3;
 }
 
 }  // namespace qdmd::scene

@@ -24,8 +24,13 @@ class Backdrop {
   // The mean level of a box, in the frame's coordinates, per channel; of the whole frame where no
   // part of the box is in it.
   std::array<double, 3> mean(const Box& box) const;
+  // The standard deviation of the levels there, mean over the channels.
+  double contrast(const Box& box) const;
 
  private:
+  // What of the box is in the frame, in canvas coordinates; the whole frame where nothing is.
+  Box seen(const Box& box) const;
+
   int margin_;
   Picture picture_;
   Box tree_crown_, canal_, shop_window_;

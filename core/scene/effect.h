@@ -25,6 +25,7 @@ enum Stage : unsigned {
   kLight = 1 << 5,   // how much light there is
   kMeter = 1 << 6,   // what the camera's exposure makes of that
   kSensor = 1 << 7,  // what happens to the picture after that
+  kLink = 1 << 8,    // which frame's picture arrives
 };
 
 enum Need : unsigned {
@@ -104,6 +105,8 @@ class Effect {
   virtual void light(double /*time*/, Light*) const {}
   virtual void meter(double /*time*/, Light*) const {}
   virtual void sensor(FrameState&) {}
+  // The frame, 0 .. index, whose picture is seen as that of frame `index`.
+  virtual int64_t arrives(int64_t index) const { return index; }
 };
 
 struct Parameter {

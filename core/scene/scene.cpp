@@ -73,6 +73,7 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
     if (stages & kLight) stages_.light.push_back(effect);
     if (stages & kMeter) stages_.meter.push_back(effect);
     if (stages & kSensor) stages_.sensor.push_back(effect);
+    if (stages & kLink) stages_.link.push_back(effect);
   }
   plan_.actors.push_back(std::make_unique<Crossing>(options.width, options.height, plan_.pause,
                                                     streams("mover"), plan_.dress));
@@ -192,6 +193,17 @@ void Scene::crop_to_frame() {
 }
 
 void Scene::render(int64_t index, unsigned wanted) {
+  int64_t arrives = index;
+  for (const Effect* effect : stages_.link) arrives = effect->arrives(arrives);
+  if (arrives == index || (wanted & kFrame) == 0) return make(index, wanted);
+  // The picture is that of another frame; all that is true of the scene goes on.
+  make(arrives, kFrame);
+  std::swap(state_.picture, arrived_);
+  make(index, wanted & ~static_cast<unsigned>(kFrame));
+  std::swap(state_.picture, arrived_);
+}
+
+void Scene::make(int64_t index, unsigned wanted) {
   state_.index = index;
   state_.wanted = wanted;
   state_.time = static_cast<double>(index) * (plan_.pace > 0 ? plan_.pace : plan_.interval);

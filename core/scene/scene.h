@@ -25,9 +25,9 @@ inline constexpr uint8_t kPartLabel = 170;  // an object covers less than half o
 inline constexpr uint8_t kObjectLabel = 255;
 
 // Frame k follows from the options, the effects and k alone, whichever frames came before. Where
-// the label is kBackgroundLabel and no effect of the stages air and sensor is named, frame and true
-// background are equal to the bit. Effects that are not named have no part in it: no memory, no
-// random number, no code in the loop over frames.
+// the label is kBackgroundLabel and no effect of the stages air, sensor and link is named, frame
+// and true background are equal to the bit. Effects that are not named have no part in it: no
+// memory, no random number, no code in the loop over frames.
 class Scene {
  public:
   // Throws std::invalid_argument, with a sentence that says what is allowed, for options out of
@@ -61,10 +61,12 @@ class Scene {
 
  private:
   struct Stages {
-    std::vector<Effect*> world, ground, expose, air, lens, light, meter, sensor;
+    std::vector<Effect*> world, ground, expose, air, lens, light, meter, sensor, link;
   };
 
   double metered(double time);
+  // Makes it as if every frame arrived.
+  void make(int64_t index, unsigned wanted);
   void place(double time);
   void paint_world();
   void paint_objects();
@@ -79,7 +81,7 @@ class Scene {
   bool world_moves_ = false, world_holds_parts_ = false;
   FrameState state_;
   std::vector<Placement> placements_, metered_placements_;
-  Picture cropped_;
+  Picture cropped_, arrived_;
   Plane cropped_plane_;
   std::vector<Box> boxes_;
   std::array<double, 3> backdrop_mean_{};

@@ -89,7 +89,7 @@ TEST(Scene, AskingForLessGivesTheSameBytes) {
 
 bool keeps_background(const std::vector<scene::NamedEffect>& effects) {
   return std::none_of(effects.begin(), effects.end(), [](const scene::NamedEffect& effect) {
-    return effect.info->stages & (scene::kAir | scene::kSensor);
+    return effect.info->stages & (scene::kAir | scene::kSensor | scene::kLink);
   });
 }
 

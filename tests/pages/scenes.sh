@@ -17,6 +17,8 @@ frame_of() {
     trees | dynamic-background) echo 40 ;;
     abandon) echo 90 ;;
     remove | intermittent-motion | intermittent-object-motion) echo 190 ;;
+    stand | leave) echo 110 ;;
+    fog) echo 130 ;;
     bands) echo 61 ;;
     fade) echo 180 ;;
     light-switch | illumination-changes) echo 135 ;;

@@ -5,9 +5,10 @@
 
 namespace qdmd::scene {
 
-extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kClutter,
-    kBootstrap, kFoliage, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror, kMotionBlur, kRain,
-    kSnow, kDefocus, kJitter, kFade, kLightSwitch, kNight, kBands, kExposure, kNoise, kCompression;
+extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kStand, kLeave,
+    kClutter, kBootstrap, kFoliage, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror,
+    kMotionBlur, kRain, kSnow, kFog, kDefocus, kJitter, kFade, kLightSwitch, kNight, kBands,
+    kExposure, kFocusSearch, kNoise, kCompression, kLostBlocks, kSmear, kLostSignal, kFrozen;
 
 // For EffectInfo::make.
 template <typename Class>

@@ -4,12 +4,14 @@ namespace qdmd::scene {
 
 std::span<const EffectInfo* const> effects() {
   // Clothes before those who wear them; leaves near the camera are in front of everybody; a shadow
-  // lies on the floor that mirrors; the night's noise before the sensor's; the codec last.
+  // lies on the floor that mirrors; the night's noise before the sensor's; the
+  // codec after them, and then what happens to the signal on its way.
   static const EffectInfo* const kEffects[] = {
-      &kLowRate,     &kLength,     &kCamouflage, &kStop,     &kAbandon, &kRemove,      &kClutter,
-      &kBootstrap,   &kFoliage,    &kLeaves,     &kTrees,    &kWater,   &kFlicker,     &kShadow,
-      &kMirror,      &kMotionBlur, &kRain,       &kSnow,     &kDefocus, &kJitter,      &kFade,
-      &kLightSwitch, &kNight,      &kBands,      &kExposure, &kNoise,   &kCompression,
+      &kLowRate,     &kLength,  &kCamouflage,  &kStop,        &kAbandon, &kRemove,     &kStand,
+      &kLeave,       &kClutter, &kBootstrap,   &kFoliage,     &kLeaves,  &kTrees,      &kWater,
+      &kFlicker,     &kShadow,  &kMirror,      &kMotionBlur,  &kRain,    &kSnow,       &kFog,
+      &kDefocus,     &kJitter,  &kFade,        &kLightSwitch, &kNight,   &kBands,      &kExposure,
+      &kFocusSearch, &kNoise,   &kCompression, &kLostBlocks,  &kSmear,   &kLostSignal, &kFrozen,
   };
   return kEffects;
 }
