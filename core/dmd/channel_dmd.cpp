@@ -51,10 +51,13 @@ ChannelModes channel_dmd(const Eigen::MatrixXd& g, const DmdOptions& options) {
   const Index rank = spectrum.values.size();
   result.summary.rank = static_cast<int>(rank);
   if (rank == 0) return result;
+  // Algorithm 1, step 1: X = U S V^T; V and S^2 are the spectrum of X^T X.
   const Eigen::VectorXd sigma = spectrum.values.cwiseSqrt();
   result.summary.condition = sigma(0) / sigma(rank - 1);
   const Eigen::MatrixXd v_over_s = spectrum.vectors * sigma.cwiseInverse().asDiagonal();
+  // Algorithm 1, step 2: A~ = U^T Y V S^-1 = S^-1 V^T X^T Y V S^-1.
   const Eigen::MatrixXd a_tilde = v_over_s.transpose() * g.topRightCorner(m - 1, m - 1) * v_over_s;
+  // Algorithm 1, step 3: A~ W = W Lambda.
   const Eigen::EigenSolver<Eigen::MatrixXd> eigen(a_tilde);
   if (eigen.info() != Eigen::Success) {
     if (rank == 1) return result;
@@ -66,6 +69,7 @@ ChannelModes channel_dmd(const Eigen::MatrixXd& g, const DmdOptions& options) {
   }
   const Eigen::VectorXcd values = eigen.eigenvalues();
   const Eigen::MatrixXcd w = eigen.eigenvectors();
+  // Algorithm 1, step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
   const Eigen::MatrixXcd lower = v_over_s.cast<std::complex<double>>() * w;
 
   const auto chosen = select_with_conjugates(values, options.omega_threshold, options.max_modes);
@@ -107,6 +111,7 @@ ChannelModes channel_dmd(const Eigen::MatrixXd& g, const DmdOptions& options) {
   } else {
     Eigen::MatrixXcd all = Eigen::MatrixXcd::Zero(m, rank);
     all.bottomRows(m - 1) = lower;
+    // b = Phi^+ x_1, with all modes.
     const Eigen::VectorXcd b = least_squares(r * all, r.col(0));
     result.amplitudes.resize(modes);
     for (Index p = 0; p < modes; ++p) result.amplitudes(p) = b(chosen[static_cast<size_t>(p)]);

@@ -55,7 +55,7 @@ Decomposition decompose_channels(const IntegerMatrix& gram, const DmdOptions& op
 
 namespace {
 
-// Of one window, or of one channel of it.
+// The number of modes of one window, or of one channel of it, at most.
 int most_modes(const DmdOptions& options, int snapshots) {
   if (!(options.omega_threshold > 0)) return 1;
   int modes = std::max(1, snapshots - 1);

@@ -50,7 +50,7 @@ std::optional<BackgroundModes> total_modes(const SnapshotFactor<double>& factor,
   Matrix both(2 * rows, later);
   both.a << past.a, next.a;
   both.b << past.b, next.b;
-  // Its right singular vectors are the left ones of its transpose.
+  // The right singular vectors of `both` are the left ones of its transpose.
   Matrix common;
   const auto turned = both.conjugate_transpose();
   if (options.rank == 1) {

@@ -11,7 +11,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 // So far does the moved mode go, over its size: more than half of the digits see the movement.
 constexpr double kShown = 1e-6;
-// Of what drives the movement, so much may be missing.
+// So much of what drives the movement may be missing.
 constexpr double kMissing = 0.05;
 constexpr int kMostSteps = 12;
 
@@ -148,7 +148,7 @@ class FullRank {
   double outside_ = 0;
 };
 
-// The same at rank one, for the leading right singular vector w.
+// How modes of rank one move: they follow from the leading right singular vector w alone.
 class RankOne {
  public:
   RankOne(const SnapshotFactor<double>& factor, Estimator estimator)
@@ -196,7 +196,7 @@ class RankOne {
     return std::nullopt;
   }
 
-  // Of w's own representative.
+  // The eigenvalue of w's own representative.
   Quaterniond lambda_of(const Matrix& w) const {
     const Matrix z = past(w);
     const Quaterniond product = dot(z, next(w));

@@ -12,7 +12,7 @@ namespace qdmd {
 class RepeatedRandom {
  public:
   explicit RepeatedRandom(uint64_t seed) : state_(2 * seed + 1) {}
-  // Of mean square size^2.
+  // A number of mean square size^2.
   Quaterniond operator()(double size) {
     const double w = next(), x = next(), y = next(), z = next();
     return Quaterniond(w, x, y, z) * (size * 0.8660254037844386);
@@ -34,8 +34,8 @@ struct Push {
   double residual = 0;  // what the eigenpair leaves, over the size of its two sides
 };
 
-// The same modes after `times` the push; `times` makes the movement small, but not so small that
-// rounding drowns it.
+// Where the modes are after `times` the push; `times` makes the movement small, but not so small
+// that rounding drowns it.
 struct FirstOrderMove {
   BackgroundModes modes;
   double times = 1;

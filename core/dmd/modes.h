@@ -52,13 +52,15 @@ struct QuaternionModes {
 };
 using BackgroundModes = QuaternionModes<double>;
 
-// |omega| = |ln lambda| in rad/frame; infinity for lambda = 0.
+// |omega| = |ln lambda| in rad/frame, the paper's omega = ln(lambda) / dt with the frame as dt;
+// infinity for lambda = 0.
 template <typename Real>
 Real omega_magnitude(const std::complex<Real>& lambda) {
   return log(Quaternion<Real>(lambda)).norm();
 }
 
-// Indices of the background modes, nearest to the origin first: all with |omega| <= threshold, or
+// Indices of the background modes, those with |omega_p| ~ 0 of the paper's separation ("sepmet"),
+// nearest to the origin first: all with |omega| <= threshold, or
 // the nearest one where none is (or threshold is 0), at most `limit` (0: any number). Equal
 // distances keep their order. Empty only for no eigenvalues.
 template <typename Real>
@@ -196,7 +198,7 @@ void fit_to_window(QuaternionModes<Real>* modes, const QuaternionMatrix<Real>& p
 
 // The b (r x 1) that minimizes |M b - x|, the one of least norm among equals: QR factorization with
 // column pivoting of the complex adjoint, columns scaled to norm one. M: k x r, x: k x 1. With the
-// modes Phi for M and the first snapshot for x these are the paper's amplitudes Phi^+ x_1.
+// modes Phi for M and the first snapshot for x these are the paper's amplitudes b = Phi^+ x_1.
 // `dependent` is set where rounding may have decided what is dependent.
 template <typename Real>
 QuaternionMatrix<Real> least_squares(const QuaternionMatrix<Real>& m,

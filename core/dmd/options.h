@@ -10,7 +10,7 @@ namespace qdmd {
 
 enum class Solver {
   gram,           // from the exact Gram matrix alone
-  gram_extended,  // the same with the Gram matrix factorized in double-double
+  gram_extended,  // from the Gram matrix, factorized in double-double
   qr,             // from a Householder QR factorization of the pixel columns
   adjoint,        // the paper's procedure, literally, on the complex adjoint of the pixels
   automatic       // gram, and gram_extended where the bound of gram is not below kSureBound
@@ -63,14 +63,14 @@ struct DmdSummary {
   int background_modes = 0;         // 0 where X is zero
   std::complex<double> lambda = 0;  // eigenvalue, imaginary part >= 0
   double omega = 0;                 // |ln lambda|, rad/frame; infinity where lambda = 0
-  // Of the eigenpair, relative: |Q~ w - w lambda| / (|Q~| |w|), or at full rank
+  // The eigenpair's residual, relative: |Q~ w - w lambda| / (|Q~| |w|), or at full rank
   // |H v - R11 v lambda| / ((|H| + |lambda| |R11|) |v|). A few epsilon where all is well.
   double residual = 0;
   // Largest over smallest singular value that was kept; at full rank an estimate from below.
   double condition = 1;
   // False: the eigenvalue iteration did not end, and rank one was solved in its place.
   bool converged = true;
-  // The one that gave the result: another than was asked for where that one could not.
+  // The solver that gave the result: another than was asked for where that one could not.
   Solver solver = Solver::gram;
   // No level of L(t) inside the window is farther from what exact arithmetic gives; infinite where
   // that cannot be told. Of exact DMD: not computed, infinite.

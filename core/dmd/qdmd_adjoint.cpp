@@ -7,19 +7,23 @@
 #include "core/dmd/qdmd.h"
 #include "core/quaternion/svd.h"
 
+// This procedure is no fast way to anything; it is in the product, and not with the tests' oracles,
+// because it is what solver=adjoint promises: the paper, literally.
+
 namespace qdmd {
 namespace {
 
-// Every other column, the first included (the paper's col_odd).
+// Every other column, the first included: col_odd of the QSVD that follows the paper's Theorem 3.
 Eigen::MatrixXcd odd_columns(const Eigen::MatrixXcd& m, Eigen::Index count) {
   Eigen::MatrixXcd odd(m.rows(), count);
   for (Eigen::Index k = 0; k < count; ++k) odd.col(k) = m.col(2 * k);
   return odd;
 }
 
-// The standard eigenvalues among the 2r eigenvalues of an adjoint, as r indices: of each
-// conjugate pair the one with the non-negative imaginary part. Sorted by real part and then by
-// distance from the real axis, pairs are neighbours; a real eigenvalue stands there twice.
+// The standard eigenvalues among the 2r eigenvalues of an adjoint (the paper's Theorem 2), as r
+// indices: of each conjugate pair the one with the non-negative imaginary part. Sorted by real part
+// and then by distance from the real axis, pairs are neighbours; a real eigenvalue stands there
+// twice.
 std::vector<Eigen::Index> standard_eigenvalues(const Eigen::VectorXcd& values) {
   const double tolerance = 1e-9 * std::max(1.0, values.cwiseAbs().maxCoeff());
   std::vector<Eigen::Index> upper, real;
@@ -55,7 +59,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   ::operator delete(::operator new(static_cast<size_t>(
       adjoint_bytes(static_cast<double>(x.rows()), static_cast<double>(m)) * 6 / 7)));
 
-  // Step 1, by the complex representation's SVD.
+  // Algorithm 2, step 1: X = U S V^H, by the complex representation's SVD.
   const auto svd = dense_svd(x.left_cols(m - 1).adjoint());
   const Eigen::VectorXd& doubled = svd.values;
   const double tolerance = static_cast<double>(2 * std::max(x.rows(), m)) *
@@ -72,8 +76,9 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   const auto v = QuaternionMatrixd::from_adjoint_columns(odd_columns(svd.v, rank));
   const auto v_over_s = v.scale_cols(sigma.cwiseInverse());
 
-  // Steps 2 and 3.
+  // Algorithm 2, step 2: Q~ = U^H Y V S^-1.
   const QuaternionMatrixd q_tilde = u.conjugate_transpose() * y * v_over_s;
+  // Algorithm 2, step 3: Q~ W = W Lambda, by the eigenvectors of the complex representation.
   const Eigen::ComplexEigenSolver<Eigen::MatrixXcd> eigen(q_tilde.adjoint());
   const auto standard = standard_eigenvalues(eigen.eigenvalues());
   const Index available = static_cast<Index>(standard.size());
@@ -94,7 +99,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   }
   const auto w = QuaternionMatrixd::from_adjoint_columns(columns);
 
-  // Step 4, then the background's share.
+  // Algorithm 2, step 4: Phi = Y V S^-1 W; then the background's share.
   const QuaternionMatrixd lower = v_over_s * w;
   const QuaternionMatrixd phi = y * lower;
   const auto chosen = select_background<double>(eigenvalues, options.omega_threshold,
@@ -115,6 +120,7 @@ BackgroundModes qdmd_from_adjoint(const QuaternionMatrixd& x, const DmdOptions& 
   if (options.amplitude == Amplitude::window) {
     fit_to_window(&result, background, x);
   } else {
+    // b = Phi^+ x_1, with all modes.
     const auto b = least_squares<double>(phi, x.col(0));
     result.amplitudes = QuaternionMatrixd(modes, 1);
     for (Index p = 0; p < modes; ++p)

@@ -34,8 +34,8 @@ void set_combination(QuaternionModes<Real>* modes, Eigen::Index p,
   modes->combination.b.col(p).tail(lower.rows()) = lower.b;
 }
 
-// The projected operator: Q~ = (X C)^H Y C for coefficients C (m - 1 x rank) that make X C
-// orthonormal. C = V S^-1 in the paper; C = R11^-1 is a rotation of it.
+// The projected operator of Algorithm 2, step 2: Q~ = (X C)^H Y C for coefficients C (m - 1 x rank)
+// that make X C orthonormal. C = V S^-1 in the paper; C = R11^-1 is a rotation of it.
 template <typename Real>
 struct Projection {
   QuaternionMatrix<Real> coefficients, q_tilde;
@@ -87,7 +87,7 @@ std::optional<QuaternionModes<Real>> nearest_mode(const QuaternionMatrix<Real>& 
   return result;
 }
 
-// The same for a projection, whose Q~ is reduced to Hessenberg form first.
+// The mode nearest the origin for a projection, whose Q~ is reduced to Hessenberg form first.
 template <typename Real>
 std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection<Real>& projection,
                                                                 const SnapshotFactor<Real>& factor,
@@ -107,7 +107,8 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   return result;
 }
 
-// All that is asked, from the Schur form. Empty where the eigenvalue iteration does not end.
+// All that is asked, from the Schur form of Q~ (Algorithm 2, step 3: Q~ W = W Lambda). Empty where
+// the eigenvalue iteration does not end.
 template <typename Real>
 std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real>& projection,
                                                            const SnapshotFactor<Real>& factor,
@@ -121,7 +122,7 @@ std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real
       select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
   const auto coefficients = projection.coefficients * form.q;
 
-  // Step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
+  // Algorithm 2, step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
   QuaternionModes<Real> result(m, static_cast<Eigen::Index>(chosen.size()));
   result.selection = selection;
   for (Eigen::Index p = 0; p < result.eigenvalues.size(); ++p) {
@@ -200,7 +201,8 @@ std::optional<QuaternionModes<Real>> full_rank_modes(const SnapshotFactor<Real>&
   return result;
 }
 
-// Step 1 without pixels: singular values of X and the coefficients V S^-1, and U^H for step 2.
+// Algorithm 2, step 1, without pixels: singular values of X and the coefficients V S^-1, and U^H
+// for step 2.
 template <typename Real>
 struct PastSpectrum {
   Eigen::Matrix<Real, Eigen::Dynamic, 1> sigma;

@@ -8,7 +8,7 @@
 
 namespace qdmd {
 
-// L(t) = sum_p phi_p exp(omega_p t) b_p (the paper's separation equation, background part) in real
+// L(t) = sum_p phi_p exp(omega_p t) b_p (the paper's equation "sepmet", background part) in real
 // arithmetic. A mode is a linear combination of snapshots, so with W the 3m x n matrix of the
 // window's planes (row 3 t + c: channel c of snapshot t),
 //     pictures = basis() W             (K x n, once per window)
@@ -35,7 +35,7 @@ class TemporalModel {
   Eigen::MatrixXd basis() const;
   // 3 x K, finite for every t: growth saturates far above the range of a picture.
   Eigen::MatrixXd weights(double t) const;
-  // The same into `weights`, which is resized where it has another size.
+  // Writes the weights into `weights`, which is resized where it has another size.
   void weights(double t, Eigen::MatrixXd* weights) const;
 
  private:

@@ -18,7 +18,7 @@ constexpr size_t kPixelsPerPart = 16384;
 
 constexpr size_t kUnit = BackgroundModel::kSliceUnit;
 
-// Of samples in units of 1 / 2^low_bits levels, in levels. Sensitivity is a ratio.
+// Turns a summary in units of 1 / 2^low_bits levels into one in levels. Sensitivity is a ratio.
 void put_in_levels(int low_bits, DmdSummary* summary) {
   if (low_bits == 0) return;
   const double unit = 1.0 / (1 << low_bits);

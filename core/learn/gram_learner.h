@@ -42,7 +42,7 @@ class GramLearner : public Learner {
   LearnerRoom room_ = {};
   SlidingGram gram_;
   double products_told_ = 0;  // seconds of Clock::products that earlier solves have told of
-  // Of the newest decompose().
+  // What the newest decompose() used and found.
   std::optional<SnapshotRange> snapshots_;
   TemporalModel background_;
   SolveFacts decomposed_, built_;

@@ -25,9 +25,9 @@ struct MaskCounts {
   // throws std::invalid_argument and counts nothing.
   void add(const uint8_t* mask, const uint8_t* labels, size_t pixels);
 
-  // Of the pixels called foreground, the share that is. None where nothing was called so.
+  // The share of the pixels called foreground that is. None where nothing was called so.
   std::optional<double> precision() const;
-  // Of the foreground pixels, the share that was called so. None where there is no foreground.
+  // The share of the foreground pixels that was called so. None where there is no foreground.
   std::optional<double> recall() const;
   // 2 precision recall / (precision + recall) = 2 TP / (2 TP + FP + FN). None where nothing is
   // foreground and nothing was called so.

@@ -29,9 +29,9 @@ class SideThread {
   // Waits until the work that start() began is done (at once if there is none), and throws on its
   // exception.
   void finish();
-  // The same, but forgets the exception: nobody wants the result.
+  // Waits as finish() does, but forgets the exception: nobody wants the result.
   void abandon() noexcept;
-  // The same, but keeps the exception for finish().
+  // Waits as finish() does, but keeps the exception for finish().
   void rest() noexcept { wait(); }
   // Waits until the work that start() began is done, or until the time `then`.
   void wait_until(std::chrono::steady_clock::time_point then);

@@ -48,7 +48,7 @@ template <typename Real>
 struct Cholesky {
   // pivots x size. Upper trapezoidal with a real positive diagonal when taken in order.
   QuaternionMatrix<Real> r;
-  // Of the diagonal of R: how many squared pivots were above the tolerance before one was not.
+  // How many squared pivots on R's diagonal were above the tolerance before one was not.
   Eigen::Index pivots = 0;
 
   bool complete() const { return pivots == r.cols(); }
@@ -124,7 +124,7 @@ Cholesky<Real> cholesky(const QuaternionMatrix<Real>& g, Real tolerance) {
   return factor;
 }
 
-// The same with the largest pivot that is left taken first, so that a G of any rank is factorized
+// Cholesky with the largest pivot that is left taken first, so that a G of any rank is factorized
 // (all of G is read). R keeps the order of G's columns, is not triangular then, and has as many
 // rows as there are squared pivots above the tolerance. Costs size * pivots^2: cheap for a low
 // rank.

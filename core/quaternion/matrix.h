@@ -104,8 +104,8 @@ class QuaternionMatrix {
     b.row(r) = qa * old_b + qb * old_a.conjugate();
   }
 
-  // The 2 rows x 2 cols complex adjoint [A B; -conj(B) conj(A)] (the paper's "Complex
-  // representation"), a homomorphism: adjoint(P Q) = adjoint(P) adjoint(Q).
+  // The 2 rows x 2 cols complex adjoint [A B; -conj(B) conj(A)] (the paper's Definition 6,
+  // "Complex representation"), a homomorphism: adjoint(P Q) = adjoint(P) adjoint(Q).
   ComplexMatrix adjoint() const {
     ComplexMatrix chi(2 * rows(), 2 * cols());
     chi << a, b, -b.conjugate(), a.conjugate();

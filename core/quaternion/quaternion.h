@@ -16,7 +16,7 @@ bool square_is_safe(const Real& squared) {
 }
 
 // q = w + x i + y j + z k. Real is double, a wider float or a multiprecision type.
-// The same number as a pair of complex numbers is q = (w + x i) + (y + z i) j.
+// As a pair of complex numbers it is q = (w + x i) + (y + z i) j.
 template <typename Real>
 struct Quaternion {
   Real w{0}, x{0}, y{0}, z{0};
@@ -91,8 +91,8 @@ struct Quaternion {
 
 using Quaterniond = Quaternion<double>;
 
-// e^q = e^S(q) (cos|V(q)| + V(q)/|V(q)| sin|V(q)|), the paper's exponential of a full quaternion.
-// A null vector part is the real exponential.
+// e^q = e^S(q) (cos|V(q)| + V(q)/|V(q)| sin|V(q)|): the paper's Definition 2 ("fullexpo"), which
+// for a pure quaternion is Definition 1 ("exppure"). A null vector part is the real exponential.
 template <typename Real>
 Quaternion<Real> exp(const Quaternion<Real>& q) {
   using std::cos, std::exp, std::sin;
@@ -104,9 +104,10 @@ Quaternion<Real> exp(const Quaternion<Real>& q) {
   return {scale * cos(angle), q.x * s, q.y * s, q.z * s};
 }
 
-// ln q = ln|q| + V(q)/|V(q)| atan2(|V(q)|, S(q)), the paper's logarithm with its arctan read as
-// atan2 so that every quadrant is right. A negative real has no axis of its own: i is taken, the
-// choice that makes ln agree with the principal complex logarithm. ln 0 is -infinity + 0.
+// ln q = ln|q| + V(q)/|V(q)| atan2(|V(q)|, S(q)): the paper's Definition 3 ("logarithm") by the
+// formula that follows it, ln q = ln|q| + mu phi, with its arctan read as atan2 so that every
+// quadrant is right. A negative real has no axis of its own: i is taken, the choice that makes ln
+// agree with the principal complex logarithm. ln 0 is -infinity + 0.
 template <typename Real>
 Quaternion<Real> log(const Quaternion<Real>& q) {
   using std::atan2, std::log;
@@ -120,7 +121,8 @@ Quaternion<Real> log(const Quaternion<Real>& q) {
 }
 
 // Unit d with conj(d) q d = S(q) + |V(q)| i: turns a quaternion into the representative of its
-// eigenvalue class that has a non-negative imaginary part (the paper's "Eigenvalue class").
+// eigenvalue class that has a non-negative imaginary part (the paper's Definition 5, "Eigenvalue
+// class", and Theorem 1, "standard eigenvalues").
 template <typename Real>
 Quaternion<Real> standardizing_rotation(const Quaternion<Real>& q) {
   const Real sine = q.vector_norm();

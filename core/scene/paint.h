@@ -43,9 +43,10 @@ void repeat_over_canvas(const FrameState& state, double x, double y, double widt
 // the four neighbours. (left, top) of the canvas is the frame's first pixel at shift 0; shifts stay
 // inside the canvas.
 void crop(const Picture& canvas, double left, double top, Picture* frame);
-// The same, rounded up, so that a pixel that an object touches at all is not 0.
+// Crops a plane as a picture, but rounds up, so that a pixel that an object touches at all is not
+// 0.
 void crop(const Plane& canvas, double left, double top, Plane* frame);
-// The same where the frame is turned clockwise around its middle, by `turn` radians.
+// Crops a frame that is turned clockwise around its middle, by `turn` radians.
 void crop_turned(const Picture& canvas, double left, double top, double turn, Picture* frame);
 void crop_turned(const Plane& canvas, double left, double top, double turn, Plane* frame);
 

@@ -24,7 +24,7 @@ struct Corners {
   double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
 };
 
-// Of a box of the world in the frame, before it is cut off.
+// The corners in the frame of a box of the world, before it is cut off.
 Corners seen_corners(const Box& box, const FrameState& state) {
   const double middle_x = (state.width - 1) / 2.0, middle_y = (state.height - 1) / 2.0;
   const double cosine = std::cos(state.turn), sine = std::sin(state.turn);

@@ -49,7 +49,8 @@ class Scene {
   const Picture& background() const { return state_.truth; }
   // width x height labels.
   const Plane& labels() const { return state_.coverage; }
-  // Of every object of which some pixel may be in the frame, without the blur of lens and shutter.
+  // One for every object of which some pixel may be in the frame, without the blur of lens and
+  // shutter.
   const std::vector<Box>& boxes() const { return boxes_; }
   const Light& light() const { return state_.light; }
   // Pixels by which the camera looks to the right and down of its place, and radians by which it is

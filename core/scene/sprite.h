@@ -36,7 +36,7 @@ Sprite draw_lorry(int width, int height, const Colour& paint);
 Sprite draw_bag(int height, const Colour& leather);
 // A leaf near the camera: `length` pixels from stalk to tip, turned by `angle` radians, with ribs.
 Sprite draw_leaf(double length, double angle, const Colour& green);
-// The same figure facing the other way.
+// The figure facing the other way.
 Sprite mirrored(const Sprite& sprite);
 // Moves every opaque pixel so that the mean is `mean`, with the texture at `contrast` of itself.
 Sprite repainted(const Sprite& sprite, const std::array<double, 3>& mean, double contrast);

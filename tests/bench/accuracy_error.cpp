@@ -160,7 +160,7 @@ void measure_solvers(const std::string& scene, int frames, int turns, double sec
   std::vector<DmdOptions> options;
   for (int rank : {0, 3, 1})
     for (Solver solver : kSolvers) {
-      // Its SVD takes minutes for more.
+      // The adjoint's SVD takes minutes for more.
       if (solver == Solver::adjoint && frames > 12) continue;
       const Point point{"error", "solvers", scene,  "qdmd", test::name_of(solver), rank, 1,
                         frames,  1,         kWidth, kHeight};

@@ -50,7 +50,7 @@ std::string head() {
   return text;
 }
 
-// Of /proc/self/status, in MB; below 0: not there.
+// A field of /proc/self/status, in MB; below 0: not there.
 double status_megabytes(const std::string& name) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)

@@ -14,7 +14,8 @@ inline double seconds_on(clockid_t clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Of all threads of this process on a core: what others take of the machine is not in it.
+// Seconds that all threads of this process spent on a core: what others take of the machine is not
+// in it.
 inline double cpu_seconds() { return seconds_on(CLOCK_PROCESS_CPUTIME_ID); }
 
 template <typename Work>

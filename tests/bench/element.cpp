@@ -294,8 +294,8 @@ void time_per_frame(benchmark::State& state, const Case& size) {
     return i;
   };
   const size_t identity = index_of("identity"), segmentation = index_of("segmentation");
-  // Of every turn, because turns differ more than peers within one. What buffers and pads cost is
-  // no part of an element's work; OpenCV's classes have none.
+  // It is taken in every turn, because turns differ more than peers within one. What buffers and
+  // pads cost is no part of an element's work; OpenCV's classes have none.
   const auto net = [&](size_t i) {
     std::vector<double> result = times[i];
     if (dynamic_cast<const ElementPeer*>(peers[i].get()))

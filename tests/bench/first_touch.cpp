@@ -12,7 +12,7 @@ namespace {
 
 constexpr int64_t kMegabyte = int64_t{1} << 20;
 
-// Of frames that come one after another: a megabyte at a time.
+// Touches memory as frames come one after another: a megabyte at a time.
 template <typename Allocator>
 void touch(benchmark::State& state) {
   const int64_t megabytes = state.range(0);

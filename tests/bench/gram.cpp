@@ -145,7 +145,7 @@ void window_gram(benchmark::State& state, const Kernel& kernel, const Case& c) {
   if (peak) state.counters["of_peak"] = median(fractions);
 }
 
-// The same window with a quarter of the chroma samples, 2 x 2 pixels to each.
+// The window with a quarter of the chroma samples, 2 x 2 pixels to each.
 void window_of_shared_chroma(benchmark::State& state, const Kernel& kernel, const Case& c) {
   const ChromaShape shape = {c.width, c.height, 2, 2};
   Window window(c.frames, shape);

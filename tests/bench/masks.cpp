@@ -149,7 +149,7 @@ struct Labels {
   std::vector<uint8_t> colours;
 };
 
-// The same with OpenCV.
+// What specks.cpp does, with OpenCV.
 void take_out(Labels* all, cv::Mat* mask) {
   const auto one = [&](const cv::Mat& from, uint8_t colour, size_t least, int connectivity) {
     const int count = cv::connectedComponentsWithStats(from, all->labels, all->stats,
@@ -170,7 +170,7 @@ void take_out(Labels* all, cv::Mat* mask) {
   one(all->inverted, 0, mask->total() / kHole, 4);
 }
 
-// Of masks after the vote; many: with a speck of 4 x 4 pixels in every 1600 pixels, too.
+// Adds masks after the vote; many: with a speck of 4 x 4 pixels in every 1600 pixels, too.
 template <typename Finder>
 void add_specks(const std::string& name, const Size& size, bool many,
                 std::function<std::shared_ptr<Finder>()> make) {

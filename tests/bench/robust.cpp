@@ -85,7 +85,7 @@ struct Solve {
   std::array<const uint8_t*, 3> x(int t) const {
     return {window.plane(t, 0), window.plane(t, 1), window.plane(t, 2)};
   }
-  // Of frames in which 2 x 2 pixels share the samples of channels 1 and 2.
+  // Makes frames in which 2 x 2 pixels share the samples of channels 1 and 2.
   void share_chroma() {
     const ChromaShape shape = {size.width, size.height, 2, 2};
     shared = PlaneSlots(size.window, shape);

@@ -26,7 +26,7 @@ struct Case {
   Method method;
   int width, height, window, threads;
 
-  // Of one that sets no more than that.
+  // The options of a user who sets no more than that.
   EngineOptions options() const {
     EngineOptions options;
     options.method = method;

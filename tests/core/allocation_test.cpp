@@ -21,7 +21,7 @@ int64_t allocations_of(Work work) {
   return allocator::seen().allocations;
 }
 
-// The same where there should be none: says where the first one came from (addr2line -e).
+// Counts where there should be none, and says where the first one came from (addr2line -e).
 template <typename Work>
 int64_t unwanted_of(Work work) {
   const int64_t count = allocations_of(work);

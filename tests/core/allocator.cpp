@@ -178,7 +178,7 @@ bool remove(const void* at, size_t* size) {
   *size = table[slot].size;
   bytes -= static_cast<int64_t>(*size);
   --blocks;
-  // Those behind it that could not have their home move up.
+  // Entries behind it that could not have their home move up.
   for (size_t next = (slot + 1) % kSlots; table[next].at; next = (next + 1) % kSlots) {
     const size_t from_home = (next - home(table[next].at)) % kSlots;
     if (from_home < (next - slot) % kSlots) continue;
@@ -465,7 +465,7 @@ void* operator new(size_t size, std::align_val_t alignment) {
 void* operator new[](size_t size, std::align_val_t alignment) {
   return allocate_or_throw(CALLER, size, static_cast<size_t>(alignment));
 }
-// Of a stable sort's buffer.
+// A stable sort takes its buffer here.
 void* operator new(size_t size, const std::nothrow_t&) noexcept {
   return allocate(CALLER, size, [&] { return __libc_malloc(size > 0 ? size : 1); });
 }

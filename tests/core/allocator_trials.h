@@ -20,7 +20,7 @@ namespace qdmd::test {
 
 inline const bool kLongTrials = std::getenv("QDMD_LONG") != nullptr;
 
-// Its description is printed where the process ends in the middle.
+// The trial's name is printed where the process ends in the middle.
 inline std::string& trial_name() {
   static std::string name;
   return name;
@@ -34,7 +34,7 @@ inline void report_trial(int signal) {
   std::raise(signal);
 }
 
-// Those of the first `last` allocations since allocator::note_places() that are to fail.
+// Which of the first `last` allocations since allocator::note_places() are to fail.
 inline std::vector<int64_t> allocations_to_try(const std::string& what, int64_t last) {
   static std::set<uint64_t> tried;
   std::vector<int64_t> numbers;

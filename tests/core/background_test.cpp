@@ -175,7 +175,7 @@ double worst_deviation(const BackgroundModel& model, const Clip& clip,
   return worst;
 }
 
-// The same L(t) in twice the pictures that a window of m snapshots keeps as pictures.
+// A model's L(t) in twice the pictures that a window of m snapshots keeps as pictures.
 TemporalModel with_idle_modes(TemporalModel model, int snapshots) {
   const QuaternionMatrixd nothing(snapshots, 1);
   while (4 * model.picture_count() <= 6 * snapshots)

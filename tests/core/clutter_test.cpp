@@ -158,7 +158,7 @@ TEST(Clutter, IsThereWhereMuchIsHiddenByWhatMoves) {
       }
 }
 
-// Of a corner most frames show one look, and it is not the background.
+// Most frames show one look of a corner, and it is not the background.
 TEST(Clutter, ThatRestsIsNotTheBackground) {
   Pool pool(2);
   const Street street;

@@ -275,7 +275,7 @@ TEST_P(Deep, RobustIsThePlainReferenceWhereNothingMoves) {
     plain.dmd.rank = 1;
     for (size_t t = 0; t < seen.size(); ++t) {
       if (mode == Mode::live) {
-        // Its first model is that of one frame, the only one.
+        // The first model of a live window is that of one frame, the only one.
         std::vector<double> level(frames[0].begin(), frames[0].begin() + 3 * kPixels);
         if (t == 0) expect_outputs(seen[t], frames[t], level, options.levels, bits().depth);
         continue;
@@ -605,7 +605,7 @@ TEST(DeepSpectrum, IsInLevels) {
     ASSERT_TRUE(a && b);
     ASSERT_EQ(a->size(), size_t{kFrames - 1});
     ASSERT_EQ(a->size(), b->size());
-    // The same Gram matrix but for a power of two.
+    // Both have one Gram matrix but for a power of two.
     for (size_t k = 0; k < a->size(); ++k) {
       EXPECT_EQ((*a)[k].lambda, (*b)[k].lambda);
       EXPECT_EQ((*a)[k].background, (*b)[k].background);

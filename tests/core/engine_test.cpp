@@ -88,7 +88,7 @@ TEST(Engine, RemainderIsSolvedOnTheLastWholeWindow) {
   const auto out = strip.run(clip, Output::background);
   EXPECT_EQ(strip.engine.report().window_frames, 10);
   EXPECT_EQ(strip.engine.solves(), 2u);
-  // The same as an engine that saw the last ten frames only.
+  // The engine is as one that saw the last ten frames only.
   Clip last(clip.pixels, 0);
   last.frames.assign(clip.frames.begin() + 3, clip.frames.end());
   const auto expected = tail.run(last, Output::background);
@@ -133,7 +133,7 @@ TEST(Engine, FramesThatNobodyLooksAtLeaveLikeOthers) {
         looked.engine.drain();
         skipped.engine.drain();
         const auto expected = looked.pop_all(Output::background);
-        // Of every second stream the last picture, of the others none.
+        // Every second stream gives its last picture, the others none.
         while (skipped.engine.pending() > stream % 2) skipped.engine.skip();
         const auto last = skipped.pop_all(Output::background);
         if (stream % 2 == 1) {

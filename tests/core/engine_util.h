@@ -98,7 +98,7 @@ struct Strip {
   }
 };
 
-// Of plain Q-DMD: what it gives can be said exactly. robust_of() has the default method.
+// Options of plain Q-DMD: what it gives can be said exactly. robust_of() has the default method.
 inline EngineOptions window_of(int size) {
   EngineOptions options;
   options.method = Method::qdmd;
@@ -106,7 +106,7 @@ inline EngineOptions window_of(int size) {
   return options;
 }
 
-// The same, with masks in which each pixel decides by itself.
+// The options with masks in which each pixel decides by itself.
 inline EngineOptions with_pixels_alone(EngineOptions options) {
   options.steps = {false, false, false, false, false, false};
   return options;

@@ -36,7 +36,7 @@ constexpr Case kCases[] = {{0, Estimator::exact},
                            {1, Estimator::forward_backward},
                            {1, Estimator::total}};
 
-// Of a camera's window derivatives tell all, and the bound holds without being useless.
+// Derivatives tell all of a camera's window, and the bound holds without being useless.
 TEST(RoundingBound, OfACameraHoldsAndIsSmall) {
   for (int m : {8, 30, 60})
     for (const Case& c : kCases) {

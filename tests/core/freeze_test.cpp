@@ -149,7 +149,7 @@ TEST(FreezeBatch, FromTheNextWindowOn) {
         ASSERT_TRUE(strip.push(clip.frames[t]).ok());
         take(&strip, &out);
         ASSERT_EQ(out.size(), t < 9 ? 0 : t - 8);
-        // Its window's first frame leaves with its last: from then on a solve counts.
+        // A window's first frame leaves with the window's last: from then on a solve counts.
         if (t == 39 || t == 48) {
           EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 1u : 2u);
         }

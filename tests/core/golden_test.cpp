@@ -1,4 +1,4 @@
-// The same input gives the same bytes: for any number of threads, in every run, with each
+// One input gives one set of bytes: for any number of threads, in every run, with each
 // instruction set of this machine, in every kind of build. Hashes of what scenes gave are in
 // golden.txt; who changes pictures on purpose writes it anew:
 //   rm tests/core/golden.txt; QDMD_GOLDEN=tests/core/golden.txt build/tests/core/golden_test

@@ -47,7 +47,7 @@ inline const VideoLayout kVideoLayouts[] = {
     // Samples that no kernel is made for.
     {"sparse", {{{0, 0, 3}, {1, 0, 5, 2, 2}, {1, 3, 5, 2, 2}, {2, 0, 3}}}}};
 
-// The same of samples that are words, of more than 8 bits.
+// The layout with samples that are words, of more than 8 bits.
 inline VideoLayout of_words(VideoLayout layout) {
   for (ChannelAt& at : layout.at) at.offset *= 2, at.pixel_stride *= 2;
   return layout;
@@ -82,14 +82,14 @@ class VideoPicture {
   bool has(int c) const { return layout_.at[static_cast<size_t>(c)].pixel_stride != 0; }
   SampleBits bits() const { return bits_; }
   const ChannelAt& layout_of(int c) const { return layout_.at[static_cast<size_t>(c)]; }
-  // Of channel c; of alpha (3), too. Of a word its first byte.
+  // A sample of channel c, or of alpha (3); the first byte of a word.
   uint8_t& sample(int c, int x, int y) {
     const ChannelAt& at = layout_of(c);
     const auto plane = static_cast<size_t>(at.plane);
     return (*planes_[plane])[static_cast<size_t>(at.offset + y / at.rows * row_stride_[plane] +
                                                  x / at.columns * at.pixel_stride)];
   }
-  // Of more than 8 bits.
+  // Sets a sample of more than 8 bits.
   void put_word(int c, int x, int y, int value) {
     uint8_t* const at = &sample(c, x, y);
     at[0] = static_cast<uint8_t>(value << bits_.shift & 255);

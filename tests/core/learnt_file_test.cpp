@@ -42,7 +42,7 @@ Learnt small(bool limits, bool earlier, int low_bits = 0) {
   return learnt;
 }
 
-// Of a grid as fine as a picture's.
+// What is learnt on a grid as fine as a picture's.
 Learnt large() {
   Learnt learnt = small(true, true);
   learnt.width = 64;
@@ -173,7 +173,8 @@ TEST(LearntFile, EveryDamageIsSeen) {
   }
 }
 
-// Of a picture of a usual size: a sample of its bytes, all of them with QDMD_LONG.
+// A file of a picture of a usual size is damaged in a sample of its bytes, in all of them with
+// QDMD_LONG.
 TEST(LearntFile, DamageInALargeFileIsSeen) {
   const auto whole = pack(large());
   const size_t step = std::getenv("QDMD_LONG") ? 1 : 97;

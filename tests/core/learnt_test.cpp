@@ -321,7 +321,7 @@ TEST(Learnt, WhileABatchIsFrozenTheNextWindowHasIt) {
     }
 }
 
-// The same without a freeze: it is told to windows, and none shows it, now or later.
+// Without a freeze, what was learnt is told to windows, and none shows it, now or later.
 TEST(Learnt, WhileABatchIsSolvedNoWindowShowsIt) {
   auto options = options_of(Mode::batch, Method::qdmd);
   options.frame_rate = 1e9;

@@ -75,13 +75,14 @@ class PlainModel {
     double value = 0;
     double scale = 0;  // the sum of what is added up to it, each in absolute value
   };
-  // Of each sample, three planes.
+  // The level of each sample, three planes.
   std::vector<Level> at(const Clip& clip, double t) const {
     std::vector<Level> levels(3 * clip.pixels);
     for (const Mode& mode : modes_) {
       const std::complex<double> growth =
           t == mode.reference_time ? 1 : std::pow(mode.lambda, t - mode.reference_time);
-      // Of (R i + G j + B k) c (g b): one quaternion for a snapshot, whatever the pixel.
+      // The factor of (R i + G j + B k) in (R i + G j + B k) c (g b): one quaternion for a
+      // snapshot, whatever the pixel.
       const Parts grown = product({growth.real(), growth.imag(), 0, 0}, mode.amplitude);
       for (size_t s = 0; s < clip.size(); ++s) {
         const Parts share = product(mode.combination[s], grown);

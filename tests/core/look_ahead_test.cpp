@@ -44,7 +44,7 @@ Clip bag(
   return clip;
 }
 
-// Of each frame.
+// What was seen in each frame.
 struct Left {
   std::vector<double> white;    // the share of the bag's middle that is foreground
   std::vector<double> red;      // the background there, mean
@@ -107,7 +107,8 @@ constexpr double kFloor = 90 + 51.5 / 4 + 31.5 / 2, kBag = 33;
 TEST_P(LookAheadTest, WhatLeavesAfterTheFirstWindowWasForeground) {
   constexpr int kLeaves = 60;
   const Left left = run(bag([](int t) { return t < kLeaves; }), options());
-  // Its place is known when it was seen for StandingLooks::kSteady frames; window - 1 frames wait.
+  // The bag's place is known when it was seen for StandingLooks::kSteady frames; window - 1 frames
+  // wait.
   const int known = kLeaves + StandingLooks::kSteady - (kWindow - 1) + 1;
   for (int t = known; t < kFrames; ++t) {
     EXPECT_NEAR(left.red[static_cast<size_t>(t)], kFloor, 3) << t;
@@ -118,7 +119,7 @@ TEST_P(LookAheadTest, WhatLeavesAfterTheFirstWindowWasForeground) {
   }
 }
 
-// Its place is seen in other light than the frames that wait have.
+// The bag's place is seen in other light than the frames that wait have.
 TEST_P(LookAheadTest, KeepsTheLightOfFrames) {
   constexpr int kLeaves = 65, kDusk = 58;
   const Left left = run(

@@ -44,7 +44,7 @@ inline Floor grainy_floor(int width, int height, std::mt19937& rng) {
   return floor;
 }
 
-// The same with a sensor's noise.
+// The floor with a sensor's noise.
 inline Floor with_noise(Floor floor, double sigma, std::mt19937& rng) {
   std::normal_distribution<double> noise(0, sigma);
   for (auto& plane : floor.level)

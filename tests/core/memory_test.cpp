@@ -61,7 +61,7 @@ std::string describe(const Case& c) {
          (c.shared ? ", 4:2:0" : "");
 }
 
-// The same picture in whole samples, whose low bits are noise.
+// The picture in samples of `depth` bits, whose low bits are noise.
 PackedPicture deepened(const PackedPicture& from, int depth) {
   PackedPicture to(from.width, from.height, 2 * from.bytes_per_pixel);
   std::minstd_rand random(7);
@@ -302,7 +302,7 @@ TEST(Memory, OfSoftMasks) {
   }
 }
 
-// Those that are asked for late count from then on.
+// Soft masks that are asked for late count from then on.
 TEST(Memory, OfSoftMasksCountsOnceThereAreAny) {
   Engine engine;
   Case c;

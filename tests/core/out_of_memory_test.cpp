@@ -78,7 +78,7 @@ std::vector<PackedPicture> make_frames(Alpha alpha, int width, int height) {
   return frames;
 }
 
-// Those of both sizes.
+// Frames of both sizes.
 using FramePair = std::pair<std::vector<PackedPicture>, std::vector<PackedPicture>>;
 const FramePair& frames_of(Alpha alpha) {
   static const auto make = [](Alpha a) {

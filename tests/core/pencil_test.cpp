@@ -209,7 +209,7 @@ TEST(Pencil, ExactlyOne) {
 }
 
 TEST(Pencil, ClassesOfConjugates) {
-  // The same class, and its conjugate, several times: i, -j and k are one eigenvalue.
+  // One class comes several times, and so does its conjugate: i, -j and k are one eigenvalue.
   std::mt19937 rng(166);
   const Quaterniond units[] = {{0, 1, 0, 0}, {0, 0, -1, 0}, {0, 0, 0, 1}, {0, 0.6, -0.8, 0}};
   for (double angle : {0.01, 0.5, 3.0})

@@ -159,7 +159,7 @@ std::vector<Region> flooded(const Mask& mask) {
   return found;
 }
 
-// The same where no boxes overlap any more: the order does not matter.
+// Merges until no boxes overlap any more, where the order does not matter.
 std::vector<Region> merged(std::vector<Region> regions) {
   for (size_t i = 0; i < regions.size(); ++i)
     for (size_t k = 0; k < i; ++k) {

@@ -82,7 +82,7 @@ TEST(Background, ModelThatIsNoNumberIsReplacedByTheMean) {
     }
 }
 
-// Of pixels that share samples of more than 8 bits all bits are in it.
+// The mean has all bits of samples of more than 8 bits that pixels share.
 TEST(Background, MeanOfSharedSamplesOfMoreThanEightBits) {
   constexpr int kWidth = 131, kHeight = 7, kFrames = 4;
   LearnOptions options;

@@ -459,7 +459,7 @@ TEST(RobustEngine, HardCasesPass) {
         EXPECT_TRUE(std::isfinite(report.foreground.threshold));
         EXPECT_TRUE(report.dmd.converged);
         EXPECT_EQ(pictures.size(), clip.size());
-        // Of a few pixels noise alone makes the mode decay (plain Q-DMD's does, too).
+        // With a few pixels noise alone makes the mode decay (plain Q-DMD's does, too).
         if (pixels < 16) continue;
         // A live model is taken beyond its window: one of two frames that differ in their light
         // goes on with the change.

@@ -101,7 +101,7 @@ TEST(SceneSmear, TheLastWholeRowIsSeenBelow) {
   }
 }
 
-// Of blocks of 16 x 16 pixels, those that are not what the scene shows.
+// The blocks of 16 x 16 pixels that are not what the scene shows.
 std::set<int> changed_blocks(const Shot& a, const Shot& b) {
   constexpr int kColumns = kWidth / 16;
   std::set<int> blocks;

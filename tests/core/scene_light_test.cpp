@@ -103,7 +103,7 @@ TEST(SceneBands, RowsFollowASineOfTheRightPeriod) {
       // Half a level of rounding in the mean of the row.
       EXPECT_NEAR(profile[y], expected, 0.5 * samples / dark) << k << " row " << y;
     }
-    // Of all periods the profile has most of the one of 240 / 3.84 rows.
+    // The profile has most of the period of 240 / 3.84 rows, among all of them.
     double best = 0, best_turns = 0;
     for (double turns = 1; turns < 8; turns += 0.02) {
       std::complex<double> sum = 0;

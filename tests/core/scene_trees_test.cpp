@@ -69,7 +69,7 @@ double difference(const Shot& a, const Shot& b, const scene::Box& box, int dx, i
   return sum / (box.width * box.height);
 }
 
-// The same where one shift of the whole box explains most.
+// The difference that is left where one shift of the whole box explains most.
 double least_difference(const Shot& a, const Shot& b, const scene::Box& box) {
   double least = 1e9;
   for (int dy = -5; dy <= 5; ++dy)

@@ -48,7 +48,7 @@ double squared_difference(const Picture& a, const Picture& b) {
   return sum;
 }
 
-// Of the pixel that is covered most.
+// The share of the frames in which the pixel that is covered most is covered.
 double share_covered(const std::vector<scene::Plane>& labels) {
   std::vector<int> frames(labels.front().samples.size());
   for (const auto& plane : labels)
@@ -174,7 +174,7 @@ TEST_P(Separation, TheDefaultIsNearAMovingBackground) {
     const Score score = separate(text, EngineOptions().dmd, GetParam());
     EXPECT_LT(score.background, 2 * score.moved);
     EXPECT_GT(score.recall, 0.9);
-    // Of a mask that is white everywhere: 0.02.
+    // A mask that is white everywhere has 0.02.
     EXPECT_GT(score.precision, precision);
   }
 }
@@ -235,7 +235,7 @@ TEST_P(Separation, MovingBackgroundsStayInTheirPlace) {
     const Score score = separate(text, rank(1), GetParam());
     EXPECT_LT(score.background, still.background + std::min(4.0, 2 * score.moved)) << text;
     EXPECT_GT(score.recall, 0.9) << text;
-    // Of a mask that is white everywhere: 0.02.
+    // A mask that is white everywhere has 0.02.
     EXPECT_GT(score.precision, precision) << text;
   }
 }

@@ -32,7 +32,7 @@ TEST(BlockSums, AreTwoDigits) {
   });
 }
 
-// The same frames, with chroma of their own size and spread to all pixels.
+// Frames in two forms: with chroma of their own size, and with it spread to all pixels.
 struct Frames {
   ChromaShape shape;
   Window shared, spread;

@@ -166,7 +166,7 @@ TEST(SharedEngine, CameraIsPushed) {
     }
 }
 
-// Of samples of more than 8 bits both digits are shared: in what is solved, decided, mended and
+// Samples of more than 8 bits share both digits: in what is solved, decided, mended and
 // written. Below 2 levels of threshold all pixels are compared in full.
 TEST(SharedEngine, MoreThanEightBits) {
   for (int depth : {10, 12, 16})

@@ -10,7 +10,7 @@ namespace {
 
 std::mt19937 rng(2105);
 
-// Those whose pixels share samples in one of the two ways that are kept.
+// Checks layouts whose pixels share samples in one of the two ways that are kept.
 template <typename Check>
 void for_every_shared_layout(Check check) {
   for (const VideoLayout& layout : kVideoLayouts) {

@@ -212,7 +212,7 @@ TEST(SoftEdge, KnowsAMaskThatMoved) {
     const auto moved = [&](size_t left) {
       return has_moved(box(left).data(), box(10).data(), kStride, kWidth, kHeight);
     };
-    // Its outline has 60 pixels; each column that it moves by changes 40.
+    // The thing's outline has 60 pixels; each column that it moves by changes 40.
     EXPECT_FALSE(moved(10));
     EXPECT_FALSE(moved(13));
     EXPECT_TRUE(moved(14));
@@ -398,7 +398,8 @@ TEST(SoftMask, IsBackgroundWhereNothingIsLookedAt) {
 struct Shown {
   std::vector<uint8_t> planes, alpha, hard;
 };
-// Of the last of 20 frames, with a shadow beside a disc; the frame's own alpha is 200.
+// What is shown of the last of 20 frames, with a shadow beside a disc; the frame's own alpha is
+// 200.
 Shown last_of(const Floor& floor, const Floor& frame, Output output, int softness, Shadows shadows,
               Colours colours, bool with_alpha) {
   EngineOptions options;

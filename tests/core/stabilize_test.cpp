@@ -170,7 +170,7 @@ TEST(Stabilize, TheSteadyPictureStandsStill) {
   const Film shaken = film("noise,jitter=3", 80);
   const EngineOptions options = robust(Stabilize::translation);
   const auto change = [](const std::vector<std::vector<uint8_t>>& pictures) {
-    // Of one window: between windows the background is another one.
+    // Both are of one window: between windows the background is another one.
     return distance_of({pictures.begin() + 41, pictures.begin() + 79},
                        {pictures.begin() + 42, pictures.begin() + 80});
   };

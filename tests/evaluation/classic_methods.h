@@ -10,7 +10,7 @@ namespace qdmd::evaluation {
 // after the last frame, when they have seen as much as the others.
 Methods classic_methods();
 
-// Of each sample over all pictures; between two middle values their mean, rounded up.
+// Each sample's median over all pictures; between two middle values their mean, rounded up.
 cv::Mat median_of(const std::vector<cv::Mat>& pictures);
 
 }  // namespace qdmd::evaluation

@@ -24,8 +24,8 @@ struct Selection {
 struct LabelledClip {
   std::vector<cv::Mat> frames;  // 8-bit BGR, all of one size
   cv::Mat truth;                // 8-bit BGR of that size; empty: none
-  // Of frames whose mask counts, 8-bit, pixels outside of the sequence's region
-  // MaskLabel::outside; others empty. No elements: no masks.
+  // The masks of frames whose mask counts, 8-bit, pixels outside of the sequence's region
+  // MaskLabel::outside; those of others are empty. No elements: no masks.
   std::vector<cv::Mat> labels;
   std::vector<std::string> problems;  // why a truth or masks had to be left out
 

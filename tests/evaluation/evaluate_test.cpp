@@ -193,7 +193,7 @@ TEST(Selection, TakesTheFramesThatItSays) {
 TEST(Selection, ThinsEvenlyAndTurnsRound) {
   const Folder data;
   write_sequence(data / "all", 30);
-  // Of frames 3 .. 27: index i * 25 / 7.
+  // Kept are those at index i * 25 / 7 of frames 3 .. 27.
   const std::vector<int> kept = {3, 6, 10, 13, 17, 20, 24};
   for (size_t i = 0; i < kept.size(); ++i) {
     write(data / "forwards/input" / numbered("in", static_cast<int>(i)), frame_at(kept[i]));

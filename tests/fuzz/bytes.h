@@ -80,7 +80,7 @@ class Bytes {
 
 }  // namespace qdmd::fuzz
 
-// Of each target: what libFuzzer calls, and what replay.cpp calls.
+// Each target defines it; libFuzzer calls it, and so does replay.cpp.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
-// Of the targets that need it: once, before the first input.
+// Targets that need it define it; it is called once, before the first input.
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv);

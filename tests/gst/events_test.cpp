@@ -95,7 +95,7 @@ TEST_F(HalfAWindow, CapsOfAnotherSizeSendItFirst) {
   for (const auto& buffer : out) EXPECT_EQ(40u * 24 * 3, gst_buffer_get_size(buffer.get()));
 }
 
-// Of the same video, in caps that say more of it.
+// The caps are of the video that plays, and say more of it.
 TEST_F(HalfAWindow, CapsThatSayMoreSendItFirst) {
   GstCaps* caps = gst_video_info_to_caps(&stream_.info());
   gst_caps_set_simple(caps, "content-light-level", G_TYPE_STRING, "1000:200", nullptr);

@@ -17,7 +17,7 @@ constexpr std::array kDeepFormats = {GST_VIDEO_FORMAT_I420_10LE, GST_VIDEO_FORMA
                                      GST_VIDEO_FORMAT_I422_12LE, GST_VIDEO_FORMAT_P012_LE,
                                      GST_VIDEO_FORMAT_P016_LE};
 
-// Of the same kind of samples, each pixel with its own.
+// The format with samples of that kind in which each pixel has its own.
 GstVideoFormat plain_format(const GstVideoInfo& info) {
   switch (GST_VIDEO_INFO_COMP_DEPTH(&info, 0)) {
     case 10:
@@ -89,7 +89,7 @@ TEST(YuvFormats, FullColourIsWhatPlanesOfRgbAre) {
                  run(std::string("window-size=6") + more, yuv, in));
 }
 
-// The same samples in another order; and in grey, where all channels are the same.
+// Layouts have one set of samples in another order; and in grey all channels are equal.
 TEST(DeepFormats, DifferInTheirLayoutOnly) {
   for (const auto& [width, height] : {std::pair{1, 1}, {61, 31}, {134, 34}})
     for (bool padded : {false, true})
@@ -117,7 +117,7 @@ TEST(DeepFormats, DifferInTheirLayoutOnly) {
           // Light is nothing that grey knows of: masks differ.
           if (std::strcmp(output, "background") != 0 && std::strcmp(output, "foreground") != 0)
             continue;
-          // Of three channels, which rounding tells apart, grey is the last.
+          // Grey is the last of three channels, which rounding tells apart.
           std::vector<Frame> seen;
           for (const Frame& frame : run(properties, rgba, in_grey)) seen.push_back({frame[2]});
           expect_equal(seen, run(properties, grey, of_grey, padded));

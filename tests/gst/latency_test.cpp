@@ -164,7 +164,7 @@ TEST(Latency, OfASolveThatHeldUpAFrameWithWhichNoneLeaves) {
   EXPECT_LE(grown, waited + 80 * GST_MSECOND);
   EXPECT_FALSE(latency.held_up(65 * GST_MSECOND)) << "it does not add up";
   EXPECT_EQ(grown, latency.promised());
-  // Of frames that come more slowly than was known.
+  // Frames come more slowly than was known.
   frames_in(&latency, 0, 100, GST_SECOND / 10);
   EXPECT_TRUE(latency.held_up(500 * GST_MSECOND));
   EXPECT_GE(latency.promised(), 24 * GST_SECOND / 10 + 500 * GST_MSECOND);

@@ -6,7 +6,7 @@
 namespace qdmd::test {
 namespace {
 
-// Of plain Q-DMD, which solves so small a window at once with its frame.
+// Plain Q-DMD, which solves so small a window at once with its frame.
 constexpr const char* kLive = "qdmdbackground mode=live method=qdmd window-size=8 hop-size=3 ";
 
 // An element of a stream, released at the end of its scope.

@@ -79,7 +79,7 @@ class Listener {
     const std::lock_guard lock(lock_);
     return std::exchange(events_, {});
   }
-  // Of the stream.
+  // The id of the pad's stream.
   std::string stream_id() const {
     gchar* id = gst_pad_get_stream_id(pad_);
     std::string text = id ? id : "";

@@ -188,7 +188,7 @@ TEST(Limits, TooLargeAWindowIsAnErrorThatSaysWhatToChange) {
   EXPECT_NE(std::string::npos, text.find(std::to_string(3ull * 200 * 4096 * 2160))) << text;
 }
 
-// Of an element whose sink pad is given caps by hand.
+// What an element says whose sink pad is given caps by hand.
 std::string said_of_caps(const std::string& launch, const std::string& text) {
   GstElement* element = gst_parse_launch(launch.c_str(), nullptr);
   GstBus* bus = gst_bus_new();

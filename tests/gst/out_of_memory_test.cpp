@@ -288,7 +288,7 @@ void check(const Case& c) {
   }
 }
 
-// Its code must be there to be told from others'.
+// The element's code must be there to be told from others'.
 void look_at_the_element() {
   GstElement* element = gst_element_factory_make("qdmdbackground", nullptr);
   ASSERT_NE(nullptr, element);

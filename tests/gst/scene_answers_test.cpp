@@ -121,8 +121,8 @@ gboolean seek_backwards(GstElement* element, GstSeekType stop_type, GstClockTime
                           stop_type, gint64(stop));
 }
 
-// Of a scene without a length. It is refused before anything is flushed: after a flush, frames
-// would lack their segment.
+// A scene without a length has no end, and a seek backwards from it is refused before anything is
+// flushed: after a flush, frames would lack their segment.
 TEST(SceneAnswers, BackwardsFromNoEndIsRefused) {
   const Element pipeline = pipeline_of("qdmdscenesrc name=source" + std::string(kCaps));
   ASSERT_TRUE(pipeline);

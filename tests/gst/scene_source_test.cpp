@@ -21,7 +21,7 @@ struct Frame {
   GstVideoInfo info;
   std::vector<uint8_t> rgb;     // width x height x 3
   std::vector<uint8_t> fourth;  // width x height where the format has four bytes a pixel
-  // Of formats of Y, U and V, and of grey: each component's samples, and all bytes.
+  // What formats of Y, U and V, and of grey, have: each component's samples, and all bytes.
   std::vector<std::vector<int>> components;
   std::vector<uint8_t> bytes;
 };
@@ -216,7 +216,7 @@ TEST(SceneSource, LabelsAreTheMaskWithShadowsAndEdgesApart) {
   for (const int label : {0, 50, 170, 255}) EXPECT_GT(pixels[static_cast<uint8_t>(label)], 3000u);
 }
 
-// The same colours as Y, U and V: of the pixels that share a sample, the mean.
+// Expects those colours as Y, U and V, a shared sample being the mean of its pixels.
 void expect_colours(const Frame& rgb, const Frame& frame) {
   const GstVideoInfo& info = frame.info;
   double kr = 0, kb = 0;

@@ -112,7 +112,7 @@ TEST(Stabilize, MessagesAreTheTruth) {
       const Heard heard =
           run("basic,jitter=2", std::string("post-messages=true mode=") + mode, 90, caps);
       EXPECT_EQ(heard.truth.size(), 90u);
-      // Those at rest say nothing.
+      // Frames at rest say nothing.
       EXPECT_GT(heard.found.size(), 75u) << caps << mode;
       EXPECT_GT(near_truth(heard), 0.95) << caps << mode;
       EXPECT_GT(std::hypot(heard.last.x, heard.last.y), 0) << caps << mode;

@@ -32,7 +32,7 @@ void __tsan_release(void* address);
   }
 
 SEEN_LOCK(g_mutex, GMutex)
-// Of a pad's stream, among others: what held it before has ended what it did.
+// A pad's stream has one, among others: what held it before has ended what it did.
 SEEN_LOCK(g_rec_mutex, GRecMutex)
 
 SEEN void g_cond_wait(GCond* cond, GMutex* mutex) {

@@ -75,7 +75,7 @@ class Element {
     g_object_get(element_, "background", &sample, nullptr);
     return sample;
   }
-  // Of its picture; empty where there is none.
+  // The bytes of the background's picture; empty where there is none.
   std::vector<uint8_t> background_bytes() const {
     GstSample* sample = background();
     if (!sample) return {};

@@ -27,8 +27,8 @@ struct Answer {
   bool converged = true;  // as in DmdSummary
 };
 
-// The same algorithm on the same window in `Decimal`. The Gram matrix is exact and 50 digits are
-// more than it can square away, so the factor is too.
+// Q-DMD of a window by the library's algorithm, in `Decimal`. The Gram matrix is exact and 50
+// digits are more than it can square away, so the factor is too.
 class DecimalSolver {
  public:
   // `probes`: the pixels at which L(t) is compared, three channels each in `pixels`
@@ -36,7 +36,7 @@ class DecimalSolver {
   DecimalSolver(const IntegerMatrix& gram, Eigen::MatrixXd pixels);
 
   Answer solve(const DmdOptions& options) const;
-  // The same after a perturbation of every snapshot by `size` times the longest one, in a
+  // Solves after a perturbation of every snapshot by `size` times the longest one, in a
   // direction that `seed` chooses within the span of the snapshots.
   Answer solve_perturbed(const DmdOptions& options, double size, unsigned seed) const;
 

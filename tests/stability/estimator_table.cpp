@@ -22,7 +22,7 @@ struct Mean {
   int count = 0;
   void add(double x) { sum += x, squares += x * x, ++count; }
   double mean() const { return sum / count; }
-  // Of one of them.
+  // The standard deviation of one of the values.
   double deviation() const {
     return std::sqrt(std::max(0.0, squares / count - mean() * mean()) * count / (count - 1));
   }
@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
   for (double factor : {1.0, 0.999})
     for (double sigma : {1.0, 3.0, 10.0})
       for (size_t frames : {size_t{50}, size_t{200}}) {
-        // Of |lambda|, and of L's light from the first frame to the last, in percent.
+        // The errors of |lambda|, and of L's light from the first frame to the last, in percent.
         const double last = static_cast<double>(frames - 1);
         const auto errors = [&](const Way& way, const SnapshotFactor<double>& snapshots) {
           DmdOptions options;

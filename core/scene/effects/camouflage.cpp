@@ -3,7 +3,7 @@
 namespace qdmd::scene {
 namespace {
 
-// Of the figures' own texture; the rest is plain cloth.
+// The share of the figures' own texture that is left; the rest is plain cloth.
 constexpr double kTexture = 0.1;
 
 class Camouflage : public Effect {

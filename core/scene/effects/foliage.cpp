@@ -8,7 +8,7 @@ namespace {
 
 // Shapes of leaves, each in some turns; many leaves have the same one.
 constexpr int kShapes = 12, kTurns = 7;
-// Of a leaf: the area of its outline over that of a square as long as it, and how far it turns to
+// The area of a leaf's outline over that of a square as long as the leaf, and how far it turns to
 // each side, in radians.
 constexpr double kFilled = 0.42 * 2 / 3, kTurn = 0.2;
 constexpr int kMostLeaves = 4000;
