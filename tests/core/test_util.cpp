@@ -4,7 +4,6 @@ namespace qdmd::test {
 
 // ---- Quaternions ----
 
-double distance(const Quaterniond& p, const Quaterniond& q) { return (p - q).norm(); }
 double distance(const QuaternionMatrixd& p, const QuaternionMatrixd& q) { return (p - q).norm(); }
 
 Quaterniond random_quaternion(std::mt19937& rng) {

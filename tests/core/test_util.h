@@ -18,13 +18,13 @@
 #include "tests/core/clips.h"
 #include "tests/core/constants.h"
 
-// Bodies are in test_util.cpp: Eigen's templates in them would take five seconds in each of the
-// files that include this.
+// Bodies with matrices are in test_util.cpp: Eigen's templates in them would take five seconds in
+// each of the files that include this.
 namespace qdmd::test {
 
 // ---- Quaternions ----
 
-double distance(const Quaterniond& p, const Quaterniond& q);
+inline double distance(const Quaterniond& p, const Quaterniond& q) { return (p - q).norm(); }
 double distance(const QuaternionMatrixd& p, const QuaternionMatrixd& q);
 Quaterniond random_quaternion(std::mt19937& rng);
 QuaternionMatrixd random_matrix(Eigen::Index rows, Eigen::Index cols, std::mt19937& rng);
