@@ -248,4 +248,12 @@ Real eigenpair_residual(const QuaternionMatrix<Real>& q_tilde, const QuaternionM
   return size > Real(0) ? Real((q_tilde * w - scaled).norm() / size) : Real(0);
 }
 
+// In double they are compiled once, in modes.cpp.
+extern template QuaternionMatrixd fit_window_amplitudes(const ComplexVector<double>&,
+                                                        const Eigen::VectorXd&,
+                                                        const QuaternionMatrixd&,
+                                                        const QuaternionMatrixd&, bool*);
+extern template QuaternionMatrixd least_squares(const QuaternionMatrixd&, const QuaternionMatrixd&,
+                                                bool*);
+
 }  // namespace qdmd

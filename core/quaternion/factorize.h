@@ -216,4 +216,11 @@ Real condition_estimate(const ScalarGrid<Real>& r) {
                                                      : std::numeric_limits<Real>::infinity();
 }
 
+// In double they are compiled once, in double.cpp.
+extern template QrFactors<double> qr(QuaternionMatrixd, bool);
+extern template Cholesky<double> cholesky(const QuaternionMatrixd&, double);
+extern template Cholesky<double> pivoted_cholesky(const QuaternionMatrixd&, double);
+extern template QuaternionMatrixd solve_upper(const QuaternionMatrixd&, QuaternionMatrixd);
+extern template double condition_estimate(const ScalarGrid<double>&);
+
 }  // namespace qdmd

@@ -58,4 +58,7 @@ HermitianEigen<Real> hermitian_eigen(QuaternionMatrix<Real> g) {
   return result;
 }
 
+// In double it is compiled once, in double.cpp.
+extern template HermitianEigen<double> hermitian_eigen(QuaternionMatrixd);
+
 }  // namespace qdmd

@@ -117,4 +117,7 @@ class HessenbergQr {
   std::vector<SmallReflector<Real>> reflectors_;
 };
 
+// In double it is compiled once, in double.cpp.
+extern template QuaternionMatrixd reduce_to_hessenberg(QuaternionMatrixd&);
+
 }  // namespace qdmd

@@ -77,4 +77,11 @@ void apply_right(const Reflector<Real>& h, QuaternionMatrix<Real>& m, Eigen::Ind
   mb.noalias() -= ub * va.transpose();
 }
 
+// In double they are compiled once, in double.cpp.
+extern template Reflector<double> make_reflector(QuaternionMatrixd);
+extern template void apply_left(const Reflector<double>&, QuaternionMatrixd&, Eigen::Index,
+                                Eigen::Index, Eigen::Index);
+extern template void apply_right(const Reflector<double>&, QuaternionMatrixd&, Eigen::Index,
+                                 Eigen::Index, Eigen::Index);
+
 }  // namespace qdmd

@@ -141,16 +141,25 @@ class QuaternionMatrix {
     return p;
   }
   friend QuaternionMatrix operator*(const QuaternionMatrix& p, const QuaternionMatrix& q) {
-    eigen_assert(p.cols() == q.rows());
-    QuaternionMatrix product;
-    product.a.noalias() = p.a * q.a;
-    product.a.noalias() -= p.b * q.b.conjugate();
-    product.b.noalias() = p.a * q.b;
-    product.b.noalias() += p.b * q.a.conjugate();
-    return product;
+    return product_of(p, q);
   }
 };
 
 using QuaternionMatrixd = QuaternionMatrix<double>;
+
+template <typename Real>
+QuaternionMatrix<Real> product_of(const QuaternionMatrix<Real>& p,
+                                  const QuaternionMatrix<Real>& q) {
+  eigen_assert(p.cols() == q.rows());
+  QuaternionMatrix<Real> product;
+  product.a.noalias() = p.a * q.a;
+  product.a.noalias() -= p.b * q.b.conjugate();
+  product.b.noalias() = p.a * q.b;
+  product.b.noalias() += p.b * q.a.conjugate();
+  return product;
+}
+
+// In double it is compiled once, in double.cpp.
+extern template QuaternionMatrixd product_of(const QuaternionMatrixd&, const QuaternionMatrixd&);
 
 }  // namespace qdmd

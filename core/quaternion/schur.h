@@ -209,4 +209,10 @@ QuaternionMatrix<Real> triangular_left_eigenvector(const QuaternionMatrix<Real>&
   return y;
 }
 
+// In double they are compiled once, in double.cpp.
+extern template SchurForm<double> schur(QuaternionMatrixd);
+extern template QuaternionMatrixd triangular_eigenvector(const QuaternionMatrixd&, Eigen::Index);
+extern template QuaternionMatrixd triangular_left_eigenvector(const QuaternionMatrixd&,
+                                                              Eigen::Index);
+
 }  // namespace qdmd

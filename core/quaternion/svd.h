@@ -129,4 +129,8 @@ Svd<Real> svd(QuaternionMatrix<Real> m) {
   return result;
 }
 
+// In double they are compiled once, in svd.cpp.
+extern template DenseSvd<Eigen::MatrixXcd> dense_svd(const Eigen::MatrixXcd&);
+extern template Svd<double> svd(QuaternionMatrixd);
+
 }  // namespace qdmd

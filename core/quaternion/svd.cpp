@@ -1,0 +1,8 @@
+#include "core/quaternion/svd.h"
+
+namespace qdmd {
+
+template DenseSvd<Eigen::MatrixXcd> dense_svd(const Eigen::MatrixXcd&);
+template Svd<double> svd(QuaternionMatrixd);
+
+}  // namespace qdmd
