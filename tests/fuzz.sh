@@ -29,8 +29,8 @@ tests/install-dependencies.sh build test fuzz
 build=build-fuzz
 again=()
 [ ! -f "$build/build.ninja" ] || again=(--reconfigure)
-# Of undefined behaviour what numbers do: with all kinds of it, and Eigen, the rest would take most
-# of an hour to compile.
+# Undefined behaviour of numbers only: with all kinds of it, and Eigen, compiling would take most of
+# an hour.
 checks=signed-integer-overflow,shift,float-cast-overflow,integer-divide-by-zero
 CXX="${FUZZ_CXX:-clang++}" meson setup "${again[@]}" "$build" -Dfuzz=true -Dtests=enabled -Dscene=enabled \
   -Db_sanitize=address -Db_lundef=false -Doptimization=1 -Ddebug=false -Dwerror=false \

@@ -29,7 +29,7 @@ if [ "$form" != --page ]; then
   build tests/bench/accuracy-cost
   if [ "$form" != --resume ]; then rm -f "$results/table.csv" "$results/seconds"; fi
   uptime >"$results/load-before"
-  # Of all runs that the table comes from.
+  # Seconds of all runs that the table comes from.
   before=$(cat "$results/seconds" 2>/dev/null || echo 0)
   trap 'echo $((before + SECONDS)) >"$results/seconds"' EXIT
   build/tests/bench/accuracy-cost "${options[@]}" "$results/table.csv"

@@ -10,9 +10,9 @@ NUMBERS = ('rank', 'step', 'window', 'iterations', 'width', 'height', 'turns', '
            'moved', 'condition', 'movement', 'sensitivity', 'lambda_error', 'background_error',
            'rank_found', 'dropped', 'budget_ms', 'before_ms', 'first_ms', 'after_ms', 'found_period',
            'found_step', 'found_iterations', 'changes')
-# Of a budget, that a mean may be above it.
+# The share of a budget that a mean may reach.
 OVER_BUDGET = 1.2
-# Of a prediction, in both directions.
+# The factor by which a prediction may be wrong, in both directions.
 WITHIN = 100
 # What grows: part, method, solver, rank, name, first window of the fit. Short windows have parts
 # that grow more slowly: whole groups of frames in the Gram matrix, squares in the small problem.

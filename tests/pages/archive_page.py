@@ -34,7 +34,7 @@ CASES = {
     '`robust`, background and masks': ('robust', ['background', 'mask']),
     '`robust`, background, masks and foreground': ('robust', ['background', 'mask', 'foreground']),
 }
-# Of the model: an 8K recording, in windows of so many frames; machines of one core each.
+# The model is of an 8K recording, in windows of so many frames; machines of one core each.
 MODEL_WIDTH, MODEL_HEIGHT, MODEL_WINDOW = 7680, 4320, 2000
 MACHINES = (1, 2, 4, 8, 16, 32, 64)
 MEMORY_PROCESSES = (1, 2, 3, 4)
