@@ -10,7 +10,7 @@ NUMBERS = ('rank', 'step', 'window', 'iterations', 'width', 'height', 'turns', '
            'moved', 'condition', 'movement', 'sensitivity', 'lambda_error', 'background_error',
            'rank_found', 'dropped', 'budget_ms', 'before_ms', 'first_ms', 'after_ms', 'found_period',
            'found_step', 'found_iterations', 'changes')
-# The share of a budget that a mean may reach.
+# The multiple of a budget that a mean may reach.
 OVER_BUDGET = 1.2
 # The factor by which a prediction may be wrong, in both directions.
 WITHIN = 100
