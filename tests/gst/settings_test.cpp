@@ -1,5 +1,8 @@
 // Properties as they are read and set, the warnings of settings that change nothing or come too
 // late, and stats.
+#include <fstream>
+#include <iterator>
+
 #include "tests/gst/element_test.h"
 
 namespace qdmd::test {
@@ -50,6 +53,34 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   }
   g_free(specs);
   gst_object_unref(element);
+}
+
+// ---- The elements' documentation ----
+
+// The first comment of a file in gst/, in one line.
+std::string doc_block_of(const char* file) {
+  std::ifstream in(std::string(QDMD_SOURCE "/gst/") + file);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const size_t end = text.find("*/");
+  EXPECT_NE(end, std::string::npos) << file;
+  std::string block = text.substr(0, end);
+  constexpr const char* kBreak = "\n * ";
+  for (size_t at = 0; (at = block.find(kBreak)) != std::string::npos;)
+    block.replace(at, std::strlen(kBreak), " ");
+  return block;
+}
+
+TEST(Documentation, SaysWhichMethodIsTheDefault) {
+  for (const auto& [name, file] : {std::pair{"qdmdbackground", "gstqdmdbackground.cpp"},
+                                   {"qdmdseparate", "gstqdmdseparate.cpp"}}) {
+    GstElement* element = gst_element_factory_make(name, nullptr);
+    const auto* spec =
+        G_PARAM_SPEC_ENUM(g_object_class_find_property(G_OBJECT_GET_CLASS(element), "method"));
+    const char* nick = g_enum_get_value(spec->enum_class, spec->default_value)->value_nick;
+    const std::string said = std::string(":method `") + nick + "`";
+    EXPECT_NE(doc_block_of(file).find(said), std::string::npos) << name << " lacks " << said;
+    gst_object_unref(element);
+  }
 }
 
 // ---- Settings that a method does not look at ----
