@@ -351,8 +351,11 @@ TEST(Band, OwnRowsCoverThePicture) {
         run_team(size, [&](ThreadTeam* team) {
           EngineOptions options = options_of(Method::robust, 8);
           options.team = team;
+          options.colours = Colours::yuv;
           options.chroma_rows = together;
-          const Band band = EnginePlan(options, 1920, height).band();
+          const EnginePlan plan(options, 1920, height);
+          EXPECT_TRUE(plan.status().ok()) << plan.status().message;
+          const Band& band = plan.band();
           EXPECT_EQ(band.height(), height);
           for (int y = band.own_first(); y < band.own_end(); ++y) ++owners[static_cast<size_t>(y)];
           EXPECT_GE(band.own_begin(), 0);

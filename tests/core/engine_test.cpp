@@ -196,8 +196,10 @@ TEST(EngineStatus, BeforeConfigure) {
   EXPECT_EQ(engine.drain().code, Status::Code::not_configured);
   EXPECT_FALSE(engine.next());
   engine.flush();
-  engine.next()->pop(Output::background, picture.out());
-  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing to pop, nothing written";
+  EXPECT_FALSE(engine.next());
+  EXPECT_EQ(engine.report().pending, 0);
+  EXPECT_FALSE(engine.write_background(picture.out()));
+  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing is written";
 }
 
 TEST(EngineStatus, PushWhileFramesAreWaiting) {
