@@ -1,7 +1,8 @@
 // Properties as they are read and set, the warnings of settings that change nothing or come too
 // late, and stats.
+#include <algorithm>
 #include <fstream>
-#include <iterator>
+#include <string>
 
 #include "tests/gst/element_test.h"
 
@@ -60,13 +61,12 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
 // The first comment of a file in gst/, in one line.
 std::string doc_block_of(const char* file) {
   std::ifstream in(std::string(QDMD_SOURCE "/gst/") + file);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  const size_t end = text.find("*/");
-  EXPECT_NE(end, std::string::npos) << file;
-  std::string block = text.substr(0, end);
-  constexpr const char* kBreak = "\n * ";
-  for (size_t at = 0; (at = block.find(kBreak)) != std::string::npos;)
-    block.replace(at, std::strlen(kBreak), " ");
+  std::string block, line;
+  while (std::getline(in, line) && line != " */") {
+    block.append(line, std::min<size_t>(line.size(), 3));
+    block.push_back(' ');
+  }
+  EXPECT_TRUE(in) << file << " does not begin with a comment";
   return block;
 }
 
@@ -77,7 +77,8 @@ TEST(Documentation, SaysWhichMethodIsTheDefault) {
     const auto* spec =
         G_PARAM_SPEC_ENUM(g_object_class_find_property(G_OBJECT_GET_CLASS(element), "method"));
     const char* nick = g_enum_get_value(spec->enum_class, spec->default_value)->value_nick;
-    const std::string said = std::string(":method `") + nick + "`";
+    std::string said = ":method `";
+    said.append(nick).push_back('`');
     EXPECT_NE(doc_block_of(file).find(said), std::string::npos) << name << " lacks " << said;
     gst_object_unref(element);
   }
