@@ -3,16 +3,23 @@
  * @title: qdmdbackground
  * @short_description: Separates background and foreground of video from a camera that stands still
  *
- * qdmdbackground collects a window of frames, computes its quaternion dynamic mode decomposition
- * (Q-DMD: each pixel is one pure quaternion R i + G j + B k, so the colour channels stay coupled),
- * takes the mode that does not change in time for the background, and sends every frame on as the
- * background, the foreground, a mask or a cut-out. Each output buffer has its own frame's
+ * qdmdbackground collects a window of frames, learns their background, and sends every frame on as
+ * the background, the foreground, a mask or a cut-out. Each output buffer has its own frame's
  * timestamps, flags and metadata; as many buffers come out as went in.
+ *
+ * By default (#GstQdmdBackground:method `robust`) what moves is found and taken out first, so that
+ * the background has no ghosts; then the quaternion dynamic mode decomposition (Q-DMD: each pixel
+ * is one pure quaternion R i + G j + B k, so the colour channels stay coupled) of what is left
+ * gives the mode that does not change in time. With `qdmd`, the paper's method, the decomposition
+ * is of the frames as they come; `dmd` decomposes each channel by itself.
  *
  * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
  * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in
- * step with a queue of more max-size-time. Its window takes 3 x window-size x width x height bytes,
- * twice as many in formats of more than 8 bits.
+ * step with a queue of more max-size-time.
+ *
+ * The window takes 3 bytes a pixel and frame, in 4:2:0 formats 1.5, and twice as many in formats of
+ * more than 8 bits. The whole element takes about 1.6 times as many, and never more than
+ * #GstQdmdBackground:max-memory.
  *
  * References: J. Han, K. I. Kou and J. Miao, "Quaternion-based dynamic mode decomposition for
  * background modeling in color videos" (Q-DMD); J. H. Tu et al., "On dynamic mode decomposition"
@@ -33,7 +40,6 @@
 #include "gst/gstqdmdbackground.h"
 
 #include <memory>
-#include <new>
 #include <utility>
 
 #include "gst/gstqdmdelement.h"
@@ -89,9 +95,8 @@ class BackgroundState : public qdmd::State {
 static_assert(alignof(BackgroundState) <= 16);
 struct _GstQdmdBackground {
   GstVideoFilter parent;
-  // In the instance's own memory: GLib ends the process where it has none.
-  BackgroundState* state;
-  alignas(BackgroundState) unsigned char room_of_state[sizeof(BackgroundState)];
+  // GLib makes the memory; init() and finalize() make and end the state in it.
+  BackgroundState state;
 };
 
 #define gst_qdmd_background_parent_class parent_class
@@ -101,13 +106,17 @@ G_DEFINE_TYPE_WITH_CODE(GstQdmdBackground, gst_qdmd_background, GST_TYPE_VIDEO_F
 GST_ELEMENT_REGISTER_DEFINE(qdmdbackground, "qdmdbackground", GST_RANK_NONE,
                             GST_TYPE_QDMD_BACKGROUND)
 
+static BackgroundState& state_of(GstBaseTransform* trans) {
+  return GST_QDMD_BACKGROUND(trans)->state;
+}
+
 // ---- Frames ----------------------------------------------------------------------------------
 
 static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* trans,
                                                              gboolean is_discont,
                                                              GstBuffer* input) {
-  GstElement* self = GST_ELEMENT(trans);
-  GstFlowReturn flow = qdmd::prepare_for(self, input);
+  BackgroundState& state = state_of(trans);
+  GstFlowReturn flow = qdmd::prepare_for(state, input);
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref(input);
     return flow;
@@ -115,12 +124,12 @@ static GstFlowReturn gst_qdmd_background_submit_input_buffer(GstBaseTransform* t
   // The parent renegotiates where that is due and leaves the buffer in queued_buf.
   flow = GST_BASE_TRANSFORM_CLASS(parent_class)->submit_input_buffer(trans, is_discont, input);
   if (flow != GST_FLOW_OK || !trans->queued_buf) return flow;
-  return qdmd::take_frame(self, qdmd::BufferPtr(std::exchange(trans->queued_buf, nullptr)));
+  return qdmd::take_frame(state, qdmd::BufferPtr(std::exchange(trans->queued_buf, nullptr)));
 }
 
 static GstFlowReturn gst_qdmd_background_generate_output(GstBaseTransform* trans, GstBuffer** out) {
   qdmd::OutputPictures pictures;
-  const GstFlowReturn flow = qdmd::next_pictures(GST_ELEMENT(trans), &pictures);
+  const GstFlowReturn flow = qdmd::next_pictures(state_of(trans), &pictures);
   *out = flow == GST_FLOW_OK && !pictures.empty() ? pictures.begin()->buffer.release() : nullptr;
   return flow;
 }
@@ -136,7 +145,7 @@ static GstFlowReturn gst_qdmd_background_transform_frame(GstVideoFilter*, GstVid
 
 static gboolean gst_qdmd_background_set_info(GstVideoFilter* filter, GstCaps* caps,
                                              GstVideoInfo* in, GstCaps*, GstVideoInfo*) {
-  return qdmd::begin_video(GST_ELEMENT(filter), *in, caps);
+  return qdmd::begin_video(state_of(GST_BASE_TRANSFORM(filter)), *in, caps);
 }
 
 static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent* event) {
@@ -148,11 +157,11 @@ static gboolean gst_qdmd_background_sink_event(GstBaseTransform* trans, GstEvent
     // Frames that wait belong to the old caps. The base class sets any others, even if the video is
     // the same.
     const qdmd::CapsPtr before(gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(trans)));
-    if (!before || !gst_caps_is_equal(before.get(), caps)) qdmd::drain(GST_ELEMENT(trans));
+    if (!before || !gst_caps_is_equal(before.get(), caps)) qdmd::drain(state_of(trans));
     if (!known) qdmd::tell_of_caps(GST_ELEMENT(trans), caps);
   }
-  qdmd::before_event(GST_ELEMENT(trans), event);
-  if (qdmd::hold_event(GST_ELEMENT(trans), event)) return TRUE;
+  qdmd::before_event(state_of(trans), event);
+  if (qdmd::hold_event(state_of(trans), event)) return TRUE;
   return GST_BASE_TRANSFORM_CLASS(parent_class)->sink_event(trans, event);
 }
 
@@ -160,7 +169,7 @@ static gboolean gst_qdmd_background_query(GstBaseTransform* trans, GstPadDirecti
                                           GstQuery* query) {
   if (GST_QUERY_TYPE(query) != GST_QUERY_LATENCY || direction != GST_PAD_SRC)
     return GST_BASE_TRANSFORM_CLASS(parent_class)->query(trans, direction, query);
-  return qdmd::answer_latency(GST_ELEMENT(trans), GST_BASE_TRANSFORM_SINK_PAD(trans), query);
+  return qdmd::answer_latency(state_of(trans), GST_BASE_TRANSFORM_SINK_PAD(trans), query);
 }
 
 static gboolean gst_qdmd_background_transform_meta(GstBaseTransform*, GstBuffer*, GstMeta* meta,
@@ -169,24 +178,24 @@ static gboolean gst_qdmd_background_transform_meta(GstBaseTransform*, GstBuffer*
 }
 
 static gboolean gst_qdmd_background_start(GstBaseTransform* trans) {
-  return qdmd::start(GST_ELEMENT(trans));
+  return qdmd::start(state_of(trans));
 }
 
 static gboolean gst_qdmd_background_stop(GstBaseTransform* trans) {
-  qdmd::close(GST_ELEMENT(trans));
+  qdmd::close(state_of(trans));
   return TRUE;
 }
 
 // ---- Class --------------------------------------------------------------------------------------
 
 static void gst_qdmd_background_finalize(GObject* object) {
-  std::destroy_at(GST_QDMD_BACKGROUND(object)->state);
+  std::destroy_at(&GST_QDMD_BACKGROUND(object)->state);
   G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_qdmd_background_init(GstQdmdBackground* self) {
   // Nothing of it takes memory yet.
-  self->state = new (self->room_of_state) BackgroundState(self);
+  std::construct_at(&self->state, self);
   // A decomposition in time needs every frame.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }

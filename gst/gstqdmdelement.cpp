@@ -11,23 +11,28 @@ GST_DEBUG_CATEGORY_EXTERN(qdmd_background_debug);
 namespace qdmd {
 namespace {
 
-constexpr guint kLoadLocationProperty = kFirstFreeProperty, kStatsProperty = kFirstFreeProperty + 1,
-                kBackgroundProperty = kFirstFreeProperty + 2;
+// Behind those of the settings.
+constexpr guint kLoadLocationProperty = kMostSettings, kStatsProperty = kMostSettings + 1,
+                kBackgroundProperty = kMostSettings + 2;
 
 GQuark state_quark() {
   static const GQuark quark = g_quark_from_static_string("qdmd-state");
   return quark;
 }
 
+State& state_of(gpointer element) {
+  return *static_cast<State*>(g_object_get_qdata(G_OBJECT(element), state_quark()));
+}
+
 // ---- Properties and signals ---------------------------------------------------------------------
 
 void set_load_location(GObject* object, const GValue* value) {
-  State* state = state_of(GST_ELEMENT(object));
+  State& state = state_of(object);
   // The old one ends after the lock.
   CharsPtr location(g_value_dup_string(value));
   GST_OBJECT_LOCK(object);
-  state->load_location.swap(location);
-  const bool changed = g_strcmp0(state->load_location.get(), location.get()) != 0;
+  state.load_location.swap(location);
+  const bool changed = g_strcmp0(state.load_location.get(), location.get()) != 0;
   const bool running = GST_STATE(object) > GST_STATE_READY;
   GST_OBJECT_UNLOCK(object);
   if (changed && running)
@@ -49,7 +54,7 @@ void warn_of_rectangles(GstElement* self, guint left_out) {
 }
 
 void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  State* state = state_of(GST_ELEMENT(object));
+  State& state = state_of(object);
   if (id == kLoadLocationProperty) {
     set_load_location(object, value);
     return;
@@ -57,10 +62,10 @@ void set_property(GObject* object, guint id, const GValue* value, GParamSpec* sp
   GValue before = G_VALUE_INIT;
   g_value_init(&before, G_PARAM_SPEC_VALUE_TYPE(spec));
   GST_OBJECT_LOCK(object);
-  get_setting(state->settings, id, &before);
-  const bool known = set_setting(&state->settings, id, value);
+  get_setting(state.settings, id, &before);
+  const bool known = set_setting(&state.settings, id, value);
   const bool running = GST_STATE(object) > GST_STATE_READY;
-  const guint left_out = state->settings.ignored_left_out;
+  const guint left_out = state.settings.ignored_left_out;
   GST_OBJECT_UNLOCK(object);
   const bool changed = known && g_param_values_cmp(spec, &before, value) != 0;
   g_value_unset(&before);
@@ -77,21 +82,21 @@ void set_property(GObject* object, guint id, const GValue* value, GParamSpec* sp
 }
 
 void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  State* state = state_of(GST_ELEMENT(object));
+  State& state = state_of(object);
   GST_OBJECT_LOCK(object);
-  bool known = get_setting(state->settings, id, value);
+  bool known = get_setting(state.settings, id, value);
   if (id == kStatsProperty) {
-    g_value_take_boxed(value, make_stats(state->report, state->counters));
+    g_value_take_boxed(value, make_stats(state.report, state.counters));
     known = true;
   }
   if (id == kLoadLocationProperty) {
-    g_value_set_string(value, state->load_location.get());
+    g_value_set_string(value, state.load_location.get());
     known = true;
   }
   GST_OBJECT_UNLOCK(object);
   if (id == kBackgroundProperty) {
-    const std::lock_guard lock(state->engine_lock);
-    g_value_take_boxed(value, state->background.get(state->engine));
+    const std::lock_guard lock(state.engine_lock);
+    g_value_take_boxed(value, state.background.get(state.engine));
     known = true;
   }
   if (!known) G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
@@ -99,13 +104,17 @@ void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
 
 void reset(GstElement* self) {
   GST_OBJECT_LOCK(self);
-  state_of(self)->reset_asked = true;
+  state_of(self).reset_asked = true;
   GST_OBJECT_UNLOCK(self);
 }
 
-gboolean save_learnt_to(GstElement* self, const gchar* file) { return save_learnt(self, file); }
+gboolean save_learnt_to(GstElement* self, const gchar* file) {
+  return save_learnt(state_of(self), file);
+}
 
-gboolean load_learnt_of(GstElement* self, const gchar* file) { return load_learnt(self, file); }
+gboolean load_learnt_of(GstElement* self, const gchar* file) {
+  return load_learnt(state_of(self), file);
+}
 
 }  // namespace
 
@@ -189,33 +198,29 @@ void install_properties_and_signals(GObjectClass* klass, WhichSettings which) {
 
 // ---- Life ---------------------------------------------------------------------------------------
 
-State::State(GstElement* element, const GstSegment* its_segment) : segment(its_segment) {
+State::State(GstElement* its, const GstSegment* its_segment) : element(its), segment(its_segment) {
   g_object_set_qdata(G_OBJECT(element), state_quark(), this);
 }
 
-State* state_of(GstElement* self) {
-  return static_cast<State*>(g_object_get_qdata(G_OBJECT(self), state_quark()));
-}
-
-bool start(GstElement* self) {
-  State* state = state_of(self);
+bool start(State& state) {
+  GstElement* const self = state.element;
   GST_OBJECT_LOCK(self);
-  state->counters = {};
-  state->report = SolveReport();
-  const guint left_out = state->settings.ignored_left_out;
+  state.counters = {};
+  state.report = SolveReport();
+  const guint left_out = state.settings.ignored_left_out;
   GST_OBJECT_UNLOCK(self);
   warn_of_rectangles(self, left_out);
   {
-    const std::lock_guard lock(state->engine_lock);
-    state->background.forget();
+    const std::lock_guard lock(state.engine_lock);
+    state.background.forget();
   }
-  return read_load_location(self);
+  return read_load_location(state);
 }
 
-bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps) {
-  State* state = state_of(self);
+bool begin_video(State& state, const GstVideoInfo& info, GstCaps* caps) {
+  GstElement* const self = state.element;
   GST_OBJECT_LOCK(self);
-  const Settings settings = state->settings;
+  const Settings settings = state.settings;
   GST_OBJECT_UNLOCK(self);
 
   if (GST_VIDEO_INFO_IS_INTERLACED(&info)) {
@@ -226,12 +231,13 @@ bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps) {
                       (nullptr));
     return false;
   }
-  if (!configure(self, settings, info, caps)) return false;
+  if (!configure(state, settings, info, caps)) return false;
 
   GST_OBJECT_LOCK(self);
-  const bool changed = state->latency.configure(
-      guint64(state->engine.delay()), GST_VIDEO_INFO_FPS_N(&info), GST_VIDEO_INFO_FPS_D(&info));
-  const GstClockTime latency = state->latency.promised();
+  const bool changed =
+      state.latency.configure(guint64(state.engine.plan().layout().delay),
+                              GST_VIDEO_INFO_FPS_N(&info), GST_VIDEO_INFO_FPS_D(&info));
+  const GstClockTime latency = state.latency.promised();
   GST_OBJECT_UNLOCK(self);
   GST_INFO_OBJECT(self, "windows of %d frames, latency %" GST_TIME_FORMAT,
                   settings.engine.window_size, GST_TIME_ARGS(latency));
@@ -261,12 +267,12 @@ void tell_of_caps(GstElement* self, GstCaps* caps) {
 
 // ---- Events, queries, metadata ------------------------------------------------------------------
 
-void before_event(GstElement* self, GstEvent* event) {
+void before_event(State& state, GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
       // Another stream, another scene.
-      drain(self);
-      drop_frames(self);
+      drain(state);
+      drop_frames(state);
       break;
     case GST_EVENT_SEGMENT:
     case GST_EVENT_SEGMENT_DONE:
@@ -275,24 +281,24 @@ void before_event(GstElement* self, GstEvent* event) {
     case GST_EVENT_STREAM_GROUP_DONE:
     case GST_EVENT_EOS:
       // The flow of these frames is not the event's: EOS goes on whatever they met.
-      drain(self);
+      drain(state);
       break;
     case GST_EVENT_FLUSH_STOP:
-      drop_frames(self);
+      drop_frames(state);
       break;
     default:
       break;
   }
 }
 
-bool answer_latency(GstElement* self, GstPad* sink, GstQuery* query) {
+bool answer_latency(State& state, GstPad* sink, GstQuery* query) {
   if (!gst_pad_peer_query(sink, query)) return false;
   gboolean live = FALSE;
   GstClockTime min = 0, max = GST_CLOCK_TIME_NONE;
   gst_query_parse_latency(query, &live, &min, &max);
-  GST_OBJECT_LOCK(self);
-  state_of(self)->latency.add_to(live, &min, &max);
-  GST_OBJECT_UNLOCK(self);
+  GST_OBJECT_LOCK(state.element);
+  state.latency.add_to(live, &min, &max);
+  GST_OBJECT_UNLOCK(state.element);
   gst_query_set_latency(query, live, min, max);
   return true;
 }

@@ -22,17 +22,17 @@ namespace qdmd {
 void install_properties_and_signals(GObjectClass* klass, WhichSettings which);
 
 // From READY to PAUSED. False: an error was posted. close() is what ends it.
-bool start(GstElement* self);
+bool start(State& state);
 // The video that comes has these caps: the engine begins anew. With the stream lock. False: an
 // error was posted.
-bool begin_video(GstElement* self, const GstVideoInfo& info, GstCaps* caps);
+bool begin_video(State& state, const GstVideoInfo& info, GstCaps* caps);
 // Posts why caps that are no video to GStreamer are refused. Its frames have 2 GB at most.
 void tell_of_caps(GstElement* self, GstCaps* caps);
 // An event is about to be forwarded, from the streaming thread: what it ends is sent or dropped
 // first. Caps are the element's own affair.
-void before_event(GstElement* self, GstEvent* event);
+void before_event(State& state, GstEvent* event);
 // A LATENCY query of a source pad.
-bool answer_latency(GstElement* self, GstPad* sink, GstQuery* query);
+bool answer_latency(State& state, GstPad* sink, GstQuery* query);
 // Metadata about the picture's geometry stays true: size and orientation do not change here.
 bool keeps_meta(const GstMetaInfo* info);
 

@@ -43,64 +43,61 @@ static void post_status(GstElement* self, const Status& status) {
 // Runs `action` (returning Status) with the engine lock; true if it succeeded, else an error is
 // posted. No exception gets past this.
 template <typename Action>
-static bool with_engine(GstElement* self, Action action) {
+static bool with_engine(State& state, Action action) {
   Status status;
   bool no_memory = false;
   gchar* what = nullptr;
   try {
-    const std::lock_guard lock(state_of(self)->engine_lock);
-    status = action(state_of(self)->engine);
+    const std::lock_guard lock(state.engine_lock);
+    status = action(state.engine);
   } catch (const std::bad_alloc&) {
     no_memory = true;
   } catch (const std::exception& error) {
     what = g_strdup(error.what());
   }
   if (no_memory) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+    GST_ELEMENT_ERROR(state.element, RESOURCE, NO_SPACE_LEFT,
                       ("Not enough memory for the window: lower window-size or scale the video "
                        "down."),
                       (nullptr));
     return false;
   }
   if (what) {
-    GST_ELEMENT_ERROR(self, LIBRARY, FAILED, (nullptr), ("%s", what));
+    GST_ELEMENT_ERROR(state.element, LIBRARY, FAILED, (nullptr), ("%s", what));
     g_free(what);
     return false;
   }
   if (status.ok()) return true;
-  post_status(self, status);
+  post_status(state.element, status);
   return false;
 }
 
 // Forgets what waits, and where time is.
-static void forget_frames(GstElement* self) {
-  State* state = state_of(self);
-  state->shells.clear();
+static void forget_frames(State& state) {
+  state.shells.clear();
   // What is true of the stream stays true.
-  while (EventPtr event = state->shells.next_event())
-    if (GST_EVENT_IS_STICKY(event.get())) state->keep(std::move(event));
-  GST_OBJECT_LOCK(self);
-  state->latency.restart();
-  GST_OBJECT_UNLOCK(self);
-  state->next_pts = GST_CLOCK_TIME_NONE;
+  while (EventPtr event = state.shells.next_event())
+    if (GST_EVENT_IS_STICKY(event.get())) state.keep(std::move(event));
+  GST_OBJECT_LOCK(state.element);
+  state.latency.restart();
+  GST_OBJECT_UNLOCK(state.element);
+  state.next_pts = GST_CLOCK_TIME_NONE;
 }
 
-void drop_frames(GstElement* self) {
-  State* state = state_of(self);
-  const std::lock_guard lock(state->engine_lock);
-  state->background.keep(state->engine);
-  state->engine.flush();
-  forget_frames(self);
+void drop_frames(State& state) {
+  const std::lock_guard lock(state.engine_lock);
+  state.background.keep(state.engine);
+  state.engine.flush();
+  forget_frames(state);
 }
 
-void close(GstElement* self) {
-  drop_frames(self);
-  State* state = state_of(self);
-  state->mask = {};
-  state->residual = {};
-  state->regions = {};
-  const std::lock_guard lock(state->engine_lock);
-  state->engine.close();
+void close(State& state) {
+  drop_frames(state);
+  state.mask = {};
+  state.residual = {};
+  state.regions = {};
+  const std::lock_guard lock(state.engine_lock);
+  state.engine.close();
 }
 
 // The time of the frames that leave with the newest solve: `leaving`, if there is one, and those of
@@ -108,10 +105,9 @@ void close(GstElement* self) {
 struct FrameTime {
   GstClockTime timestamp = GST_CLOCK_TIME_NONE, duration = GST_CLOCK_TIME_NONE;
 };
-static FrameTime time_of_solve(const State& state, GstBuffer* leaving) {
+static FrameTime time_of_solve(const State& state, int frames_left, GstBuffer* leaving) {
   FrameTime time;
-  const auto waiting =
-      std::min(static_cast<size_t>(state.engine.frames_left()), state.shells.size());
+  const auto waiting = std::min(static_cast<size_t>(frames_left), state.shells.size());
   GstBuffer* first = leaving ? leaving : waiting > 0 ? state.shells.at(0) : nullptr;
   if (!first) return time;
   GstBuffer* last = waiting > 0 ? state.shells.at(waiting - 1) : first;
@@ -123,93 +119,85 @@ static FrameTime time_of_solve(const State& state, GstBuffer* leaving) {
   return time;
 }
 
-// Backgrounds that came into use, and what was found of the newest one.
-struct NewSolves {
-  guint64 count = 0;
-  SolveReport report;
-  FrameTime time;
+// How the engine stands, and the backgrounds that came into use since the last look.
+struct News {
+  EngineReport engine;
+  guint64 solves = 0;
+  FrameTime time;  // of the newest one's frames
 };
 
 // After `frames_in` frames went into the engine and `frames_out` came out, with the engine lock,
 // since another thread may load a background: copies what others may want to know of the engine.
 // The background property's picture and its time belong together.
-static NewSolves publish(GstElement* self, guint64 frames_in, guint64 frames_out,
-                         GstBuffer* leaving) {
-  State* state = state_of(self);
-  const Engine& engine = state->engine;
-  NewSolves solves;
-  solves.count = engine.solves() - state->solves_told;
-  state->solves_told += solves.count;
-  if (solves.count > 0) {
-    solves.report = engine.report();
-    solves.time = time_of_solve(*state, leaving);
-    state->background.solved(*state->segment, solves.time.timestamp, solves.time.duration);
+static News publish(State& state, guint64 frames_in, guint64 frames_out, GstBuffer* leaving) {
+  News news = {state.engine.report(), 0, {}};
+  news.solves = news.engine.solves - state.solves_told;
+  state.solves_told += news.solves;
+  if (news.solves > 0) {
+    news.time = time_of_solve(state, news.engine.frames_left, leaving);
+    state.background.solved(*state.segment, news.time.timestamp, news.time.duration);
   }
-  GST_OBJECT_LOCK(self);
-  state->counters.frames_in += frames_in;
-  state->counters.frames_out += frames_out;
-  state->counters.solves += solves.count;
-  state->counters.solve_period = guint(engine.time_budget().effort().period);
-  state->counters.time_per_frame = 1000 * engine.time_budget().predicted();
-  state->counters.camera = engine.newest_pose();
-  state->report = engine.report();
-  GST_OBJECT_UNLOCK(self);
-  return solves;
+  GST_OBJECT_LOCK(state.element);
+  state.counters.frames_in += frames_in;
+  state.counters.frames_out += frames_out;
+  state.counters.solves += news.solves;
+  state.counters.solve_period = guint(news.engine.effort.period);
+  state.counters.time_per_frame = 1000 * news.engine.costs.predicted(news.engine.effort);
+  state.counters.camera = news.engine.newest_pose;
+  state.report = news.engine.solve;
+  GST_OBJECT_UNLOCK(state.element);
+  return news;
 }
 
 // Says what new solves found.
-static void tell_of_solves(GstElement* self, const NewSolves& solves) {
-  if (solves.count == 0) return;
-  State* state = state_of(self);
-  GST_OBJECT_LOCK(self);
-  const bool post = state->settings.post_messages;
-  const Counters counters = state->counters;
-  GST_OBJECT_UNLOCK(self);
+static void tell_of_solves(State& state, const News& news) {
+  if (news.solves == 0) return;
+  GST_OBJECT_LOCK(state.element);
+  const bool post = state.settings.post_messages;
+  const Counters counters = state.counters;
+  GST_OBJECT_UNLOCK(state.element);
   if (!post) return;
   gst_element_post_message(
-      self, gst_message_new_element(
-                GST_OBJECT(self), make_solve_message(solves.report, counters, *state->segment,
-                                                     solves.time.timestamp, solves.time.duration)));
+      state.element,
+      gst_message_new_element(GST_OBJECT(state.element),
+                              make_solve_message(news.engine.solve, counters, *state.segment,
+                                                 news.time.timestamp, news.time.duration)));
 }
 
 // Says that the frame of that time, or one a few frames before it, began another scene.
-static void tell_of_scene(GstElement* self, GstClockTime timestamp) {
-  State* state = state_of(self);
-  const guint64 scenes = state->engine.scenes(), views = state->engine.views();
-  if (scenes > state->scenes_told) {
-    GST_INFO_OBJECT(self, "another scene: learning begins anew");
+static void tell_of_scene(State& state, const EngineReport& engine, GstClockTime timestamp) {
+  if (engine.scenes > state.scenes_told) {
+    GST_INFO_OBJECT(state.element, "another scene: learning begins anew");
     gst_element_post_message(
-        self,
-        gst_message_new_element(GST_OBJECT(self), make_scene_message(*state->segment, timestamp,
-                                                                     views > state->views_told)));
+        state.element,
+        gst_message_new_element(
+            GST_OBJECT(state.element),
+            make_scene_message(*state.segment, timestamp, engine.views > state.views_told)));
   }
   // An engine that is configured anew counts anew.
-  state->scenes_told = scenes;
-  state->views_told = views;
+  state.scenes_told = engine.scenes;
+  state.views_told = engine.views;
 }
 
 // Says where the camera looked in a frame that leaves, as long as it moves.
-static void tell_of_camera(GstElement* self, const Pose& pose, GstClockTime timestamp) {
-  State* state = state_of(self);
-  const bool moves = !pose.is_rest() || state->camera_moved;
-  state->camera_moved = !pose.is_rest();
+static void tell_of_camera(State& state, const Pose& pose, GstClockTime timestamp) {
+  const bool moves = !pose.is_rest() || state.camera_moved;
+  state.camera_moved = !pose.is_rest();
   if (!moves) return;
-  GST_OBJECT_LOCK(self);
-  const bool post = state->settings.post_messages;
-  GST_OBJECT_UNLOCK(self);
+  GST_OBJECT_LOCK(state.element);
+  const bool post = state.settings.post_messages;
+  GST_OBJECT_UNLOCK(state.element);
   if (!post) return;
   gst_element_post_message(
-      self, gst_message_new_element(GST_OBJECT(self),
-                                    make_camera_message(*state->segment, timestamp, pose)));
+      state.element, gst_message_new_element(GST_OBJECT(state.element),
+                                             make_camera_message(*state.segment, timestamp, pose)));
 }
 
 // Says once that frames cannot be moved.
-static void warn_of_no_room(GstElement* self) {
-  State* state = state_of(self);
-  if (!state->engine.has_no_room_for_motion() || std::exchange(state->warned_of_no_room, true))
-    return;
+static void warn_of_no_room(State& state, const EngineReport& engine) {
+  if (!engine.no_room_for_motion || std::exchange(state.warned_of_no_room, true)) return;
   GST_ELEMENT_WARNING(
-      self, RESOURCE, NO_SPACE_LEFT,
+      state.element, RESOURCE, NO_SPACE_LEFT,
       ("The camera moves. To follow it, stabilize needs a second copy of the window, and "
        "max-memory "
        "has no room for it, so frames are not stabilized. Raise max-memory, lower window-size, or "
@@ -218,31 +206,29 @@ static void warn_of_no_room(GstElement* self) {
 }
 
 // Sets controlled properties to what they are at the time of `buffer`.
-static void follow_controllers(GstElement* self, GstBuffer* buffer) {
-  const GstSegment& segment = *state_of(self)->segment;
+static void follow_controllers(State& state, GstBuffer* buffer) {
+  const GstSegment& segment = *state.segment;
   if (segment.format != GST_FORMAT_TIME || !GST_BUFFER_PTS_IS_VALID(buffer)) return;
   const guint64 time =
       gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
-  if (GST_CLOCK_TIME_IS_VALID(time)) gst_object_sync_values(GST_OBJECT(self), time);
+  if (GST_CLOCK_TIME_IS_VALID(time)) gst_object_sync_values(GST_OBJECT(state.element), time);
 }
 
-// Where nothing is foreground in the frame of this buffer.
-static IgnoredAreas ignored_of(const Settings& settings, GstBuffer* buffer) {
-  IgnoredAreas areas = settings.ignored;
-  add_regions_of(buffer, settings.ignored_type, &areas);
-  return areas;
+// What is wished of the frame of this buffer.
+static Wishes wishes_of(const Settings& settings, GstBuffer* buffer) {
+  Wishes wishes = settings.wishes;
+  add_regions_of(buffer, settings.ignored_type, &wishes.ignored);
+  return wishes;
 }
 
-// Regions of the frame that comes out next.
-static const std::vector<Region>& next_regions(GstElement* self, int least_area) {
-  State* state = state_of(self);
-  const GstVideoInfo* info = &state->info;
+static const std::vector<Region>& regions_of(LeavingFrame* frame, State& state, int least_area) {
+  const GstVideoInfo* info = &state.info;
   const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  state->mask.resize(pixels);
-  state->residual.resize(pixels);
-  state->engine.foreground(state->mask.data(), state->residual.data());
-  return state->regions.find(state->mask.data(), state->residual.data(), width, height, least_area);
+  state.mask.resize(pixels);
+  state.residual.resize(pixels);
+  frame->foreground(state.mask.data(), state.residual.data());
+  return state.regions.find(state.mask.data(), state.residual.data(), width, height, least_area);
 }
 
 static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
@@ -259,39 +245,37 @@ static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
   }
 }
 
-void send_events(GstElement* self) {
-  State* state = state_of(self);
-  while (EventPtr event = state->shells.next_event()) state->forward(std::move(event));
+void send_events(State& state) {
+  while (EventPtr event = state.shells.next_event()) state.forward(std::move(event));
 }
 
-bool hold_event(GstElement* self, GstEvent* event) {
+bool hold_event(State& state, GstEvent* event) {
   if (!GST_EVENT_IS_SERIALIZED(event) || GST_EVENT_TYPE(event) == GST_EVENT_CAPS) return false;
   // Where downstream refused the last frame, nobody has come for them.
-  send_events(self);
-  return state_of(self)->shells.hold(event);
+  send_events(state);
+  return state.shells.hold(event);
 }
 
-GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
-  State* state = state_of(self);
+GstFlowReturn next_pictures(State& state, OutputPictures* pictures) {
   pictures->clear();
-  send_events(self);
-  if (!state->engine.ready()) return GST_FLOW_OK;
+  send_events(state);
+  if (!state.engine.next()) return GST_FLOW_OK;
 
-  const BufferPtr shell = state->shells.pop();
-  follow_controllers(self, shell.get());
-  GST_OBJECT_LOCK(self);
-  const Settings settings = state->settings;
-  GST_OBJECT_UNLOCK(self);
+  const BufferPtr shell = state.shells.pop();
+  follow_controllers(state, shell.get());
+  GST_OBJECT_LOCK(state.element);
+  const Settings settings = state.settings;
+  GST_OBJECT_UNLOCK(state.element);
 
-  const GstFlowReturn flow = state->make_pictures(shell.get(), settings, pictures);
+  const GstFlowReturn flow = state.make_pictures(shell.get(), settings, pictures);
   if (flow != GST_FLOW_OK) {
-    // Its frame is still in the engine, and nobody wants it.
-    drop_frames(self);
+    // Nobody wants what is still in the engine.
+    drop_frames(state);
     return flow;
   }
   const std::vector<Region>* regions = nullptr;
   Pose pose;
-  NewSolves solves;
+  News news;
   {
     std::optional<MappedVideoFrame> frames[OutputPictures::kMost];
     size_t mapped = 0;
@@ -299,67 +283,65 @@ GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures) {
       auto& frame = frames[mapped++];
       frame.emplace(picture.info, picture.buffer.get(), GST_MAP_WRITE);
       if (*frame) continue;
-      GST_ELEMENT_ERROR(self, RESOURCE, WRITE, (nullptr), ("could not map an output buffer"));
-      drop_frames(self);
+      GST_ELEMENT_ERROR(state.element, RESOURCE, WRITE, (nullptr),
+                        ("could not map an output buffer"));
+      drop_frames(state);
       return GST_FLOW_ERROR;
     }
-    const bool written = with_engine(self, [&](Engine& engine) {
+    const bool written = with_engine(state, [&](Engine& engine) {
       const Clock::Span span(engine.clock(), Clock::frames);
-      engine.set_foreground_threshold(settings.engine.foreground_threshold);
-      engine.set_shadows(settings.shadows);
-      engine.set_mask_softness(settings.engine.mask_softness);
-      engine.set_stabilize_output(settings.stabilize_output);
-      engine.set_ignored(ignored_of(settings, shell.get()));
-      pose = engine.next_pose();
-      if (settings.regions && mapped > 0) regions = &next_regions(self, settings.regions_min_area);
+      const Wishes wishes = wishes_of(settings, shell.get());
+      LeavingFrame* const frame = engine.next(&wishes);
+      pose = frame->pose();
+      if (settings.regions && mapped > 0)
+        regions = &regions_of(frame, state, settings.regions_min_area);
       size_t next = 0;
       for (const OutputPicture& picture : *pictures)
-        engine.write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
-      engine.skip();
-      solves = publish(self, 0, 1, shell.get());
+        frame->write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
+      frame->skip();
+      news = publish(state, 0, 1, shell.get());
       return Status();
     });
     if (!written) {
-      drop_frames(self);
+      drop_frames(state);
       return GST_FLOW_ERROR;
     }
   }
   if (regions)
     for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
-  tell_of_solves(self, solves);
-  tell_of_camera(self, pose, GST_BUFFER_PTS(shell.get()));
+  tell_of_solves(state, news);
+  tell_of_camera(state, pose, GST_BUFFER_PTS(shell.get()));
   return GST_FLOW_OK;
 }
 
-GstFlowReturn drain(GstElement* self) {
-  State* state = state_of(self);
-  if (!state->engine.configured()) return GST_FLOW_OK;
-  GST_DEBUG_OBJECT(self, "draining %u frames", guint(state->shells.size()));
+GstFlowReturn drain(State& state) {
+  if (!state.engine.configured()) return GST_FLOW_OK;
+  GST_DEBUG_OBJECT(state.element, "draining %u frames", guint(state.shells.size()));
   GstFlowReturn flow = GST_FLOW_OK;
-  NewSolves solves;
+  News news;
   const auto solve = [&](Engine& engine) {
     Status status = engine.drain();
-    if (status.ok()) solves = publish(self, 0, 0, nullptr);
+    if (status.ok()) news = publish(state, 0, 0, nullptr);
     return status;
   };
-  if (!with_engine(self, solve)) {
-    drop_frames(self);
+  if (!with_engine(state, solve)) {
+    drop_frames(state);
     return GST_FLOW_ERROR;
   }
-  tell_of_solves(self, solves);
-  while (state->goes_on(flow) && state->engine.ready()) {
+  tell_of_solves(state, news);
+  while (state.goes_on(flow) && state.engine.next()) {
     OutputPictures pictures;
-    flow = next_pictures(self, &pictures);
-    if (flow == GST_FLOW_OK) flow = state->send(&pictures);
+    flow = next_pictures(state, &pictures);
+    if (flow == GST_FLOW_OK) flow = state.send(&pictures);
   }
-  send_events(self);
-  GST_OBJECT_LOCK(self);
-  state->latency.restart();
-  GST_OBJECT_UNLOCK(self);
-  if (state->goes_on(flow)) return flow;
-  GST_DEBUG_OBJECT(self, "dropped %u frames: %s", guint(state->shells.size()),
+  send_events(state);
+  GST_OBJECT_LOCK(state.element);
+  state.latency.restart();
+  GST_OBJECT_UNLOCK(state.element);
+  if (state.goes_on(flow)) return flow;
+  GST_DEBUG_OBJECT(state.element, "dropped %u frames: %s", guint(state.shells.size()),
                    gst_flow_get_name(flow));
-  drop_frames(self);
+  drop_frames(state);
   return flow;
 }
 
@@ -369,10 +351,9 @@ enum class Step {
   jump        // back, or on by more than a camera loses
 };
 // From the frame before to `input`. Notes where the next frame is expected.
-static Step step_to(GstElement* self, GstBuffer* input) {
-  State* state = state_of(self);
-  GstClockTime* next = &state->next_pts;
-  const GstVideoInfo* info = &state->info;
+static Step step_to(State& state, GstBuffer* input) {
+  GstClockTime* next = &state.next_pts;
+  const GstVideoInfo* info = &state.info;
   const GstClockTime expected = *next, pts = GST_BUFFER_PTS(input);
   const bool has_rate = GST_VIDEO_INFO_FPS_N(info) > 0;
   GstClockTime frame = GST_BUFFER_DURATION(input);
@@ -382,7 +363,7 @@ static Step step_to(GstElement* self, GstBuffer* input) {
   *next = GST_CLOCK_TIME_NONE;
   if (!GST_CLOCK_TIME_IS_VALID(pts)) return Step::onwards;
   if (!GST_CLOCK_TIME_IS_VALID(frame)) frame = 0;
-  if (state->segment->rate < 0) {
+  if (state.segment->rate < 0) {
     // Frames come in reverse order.
     *next = pts;
     const bool meets = GST_CLOCK_TIME_IS_VALID(expected) &&
@@ -399,25 +380,24 @@ static Step step_to(GstElement* self, GstBuffer* input) {
 }
 
 // Warns once of each property that was set and has no effect with this method.
-static void warn_of_settings_without_effect(GstElement* self, const Settings& settings) {
+static void warn_of_settings_without_effect(State& state, const Settings& settings) {
   for (const char* name : options_without_effect(settings.engine.method)) {
-    const guint id = g_object_class_find_property(G_OBJECT_GET_CLASS(self), name)->param_id;
-    const guint bit = 1u << id;
-    if (!(settings.asked & bit) || (state_of(self)->warned & bit)) continue;
-    state_of(self)->warned |= bit;
-    GST_WARNING_OBJECT(self, "method=%s does not look at %s: it has no effect",
+    const guint id =
+        g_object_class_find_property(G_OBJECT_GET_CLASS(state.element), name)->param_id;
+    if (!settings.asked[id] || state.warned[id]) continue;
+    state.warned.set(id);
+    GST_WARNING_OBJECT(state.element, "method=%s does not look at %s: it has no effect",
                        method_name(settings.engine.method), name);
   }
 }
 
 // Frames that stand alone make no window: says so once.
-static void warn_of_breaks(GstElement* self, bool jump) {
-  State* state = state_of(self);
+static void warn_of_breaks(State& state, bool jump) {
   constexpr guint kMany = 3;
-  state->breaks = jump ? state->breaks + 1 : 0;
-  if (state->breaks < kMany || std::exchange(state->warned_of_breaks, true)) return;
+  state.breaks = jump ? state.breaks + 1 : 0;
+  if (state.breaks < kMany || std::exchange(state.warned_of_breaks, true)) return;
   GST_ELEMENT_WARNING(
-      self, STREAM, FORMAT,
+      state.element, STREAM, FORMAT,
       ("Frames are too far apart in time to form a window, so each frame is its own background. A "
        "gap of more than one second and more than %d frames begins a new window: set the true "
        "framerate, for instance with videorate.",
@@ -425,59 +405,61 @@ static void warn_of_breaks(GstElement* self, bool jump) {
       (nullptr));
 }
 
-bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& info,
-               GstCaps* caps) {
-  State* state = state_of(self);
-  warn_of_settings_without_effect(self, settings);
-  forget_frames(self);
-  state->info = info;
-  state->solves_told = 0;
+bool configure(State& state, const Settings& settings, const GstVideoInfo& info, GstCaps* caps) {
+  warn_of_settings_without_effect(state, settings);
+  forget_frames(state);
+  state.info = info;
+  state.solves_told = 0;
   EngineOptions options = settings.engine;
+  // The first window teaches masks alike, whatever shadows are shown as.
+  options.foreground_threshold = settings.wishes.foreground_threshold;
+  options.mask_softness = settings.wishes.mask_softness;
+  options.threads = settings.wishes.threads;
   set_format(info, &options);
   options.frame_rate = GST_VIDEO_INFO_FPS_N(&info) > 0 && GST_VIDEO_INFO_FPS_D(&info) > 0
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
-  const bool configured = with_engine(self, [&](Engine& engine) {
-    state->background.keep(engine);
-    state->background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
+  const bool configured = with_engine(state, [&](Engine& engine) {
+    state.background.keep(engine);
+    state.background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     Status status =
         engine.configure(options, GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info));
-    state->colours = options.colours;
+    state.colours = options.colours;
     if (status.ok())
-      state->shells.reserve(static_cast<size_t>(engine.delay()) + 1);
+      state.shells.reserve(static_cast<size_t>(engine.plan().layout().delay) + 1);
     else
       engine.flush();
     return status;
   });
-  return configured && apply_loaded(self);
+  return configured && apply_loaded(state);
 }
 
-GstFlowReturn prepare_for(GstElement* self, GstBuffer* input) {
-  follow_controllers(self, input);
-  GST_OBJECT_LOCK(self);
-  const bool reset = std::exchange(state_of(self)->reset_asked, false);
-  GST_OBJECT_UNLOCK(self);
-  const Step step = step_to(self, input);
+GstFlowReturn prepare_for(State& state, GstBuffer* input) {
+  follow_controllers(state, input);
+  GST_OBJECT_LOCK(state.element);
+  const bool reset = std::exchange(state.reset_asked, false);
+  GST_OBJECT_UNLOCK(state.element);
+  const Step step = step_to(state, input);
   const bool jump = step == Step::jump;
-  if (jump) GST_DEBUG_OBJECT(self, "time jumps: a new window begins");
-  warn_of_breaks(self, jump);
+  if (jump) GST_DEBUG_OBJECT(state.element, "time jumps: a new window begins");
+  warn_of_breaks(state, jump);
   // The base class keeps is_discont set until something was pushed, which can be a window later:
   // the buffer's own flag says where time breaks.
   // GstBaseSrc sets it on every buffer of reverse playback, whatever was before.
   const bool discont = GST_BUFFER_IS_DISCONT(input) && step != Step::backwards;
   if (discont || jump || reset) {
-    const GstFlowReturn flow = drain(self);
-    if (!state_of(self)->goes_on(flow)) return flow;
+    const GstFlowReturn flow = drain(state);
+    if (!state.goes_on(flow)) return flow;
   }
   if (reset) {
-    drop_frames(self);
+    drop_frames(state);
     // Loaded after the reset was asked for.
-    if (!apply_loaded(self)) return GST_FLOW_ERROR;
+    if (!apply_loaded(state)) return GST_FLOW_ERROR;
   }
   return GST_FLOW_OK;
 }
 
-// Of the clock that sinks go by; before there is one, of the system's.
+// The time of the clock that sinks go by; before there is one, of the system's.
 static GstClockTime time_now(GstElement* self) {
   ClockPtr clock(gst_element_get_clock(self));
   if (!clock) clock.reset(gst_system_clock_obtain());
@@ -486,28 +468,26 @@ static GstClockTime time_now(GstElement* self) {
 
 // After a frame that came at the time `came`: whether the next to leave waits longer than sinks
 // were told.
-static void follow_latency(GstElement* self, GstClockTime timestamp, GstClockTime came) {
-  State* state = state_of(self);
-  const GstClockTime now = state->engine.held_up() ? time_now(self) : came,
+static void follow_latency(State& state, bool held_up, GstClockTime timestamp, GstClockTime came) {
+  const GstClockTime now = held_up ? time_now(state.element) : came,
                      held = now > came ? now - came : 0;
-  GST_OBJECT_LOCK(self);
-  bool grew = state->latency.frame_in(timestamp);
-  grew |= state->latency.held_up(held);
-  if (state->engine.ready())
-    grew |= state->latency.frame_out(GST_BUFFER_PTS(state->shells.at(0)), held);
-  const GstClockTime latency = state->latency.promised();
-  GST_OBJECT_UNLOCK(self);
+  GST_OBJECT_LOCK(state.element);
+  bool grew = state.latency.frame_in(timestamp);
+  grew |= state.latency.held_up(held);
+  if (state.engine.next())
+    grew |= state.latency.frame_out(GST_BUFFER_PTS(state.shells.at(0)), held);
+  const GstClockTime latency = state.latency.promised();
+  GST_OBJECT_UNLOCK(state.element);
   if (!grew) return;
-  GST_INFO_OBJECT(self, "latency is %" GST_TIME_FORMAT " by now", GST_TIME_ARGS(latency));
-  gst_element_post_message(self, gst_message_new_latency(GST_OBJECT(self)));
+  GST_INFO_OBJECT(state.element, "latency is %" GST_TIME_FORMAT " by now", GST_TIME_ARGS(latency));
+  gst_element_post_message(state.element, gst_message_new_latency(GST_OBJECT(state.element)));
 }
 
-// Of the frames as they come; 0: never.
-static gint64 absorb_frames(GstElement* self, double seconds) {
+// So many frames as come in that time; 0: never.
+static gint64 absorb_frames(State& state, double seconds) {
   if (seconds <= 0) return 0;
-  State* state = state_of(self);
-  const GstVideoInfo* info = &state->info;
-  const double rate = state->latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
+  const GstVideoInfo* info = &state.info;
+  const double rate = state.latency.rate(GST_VIDEO_INFO_FPS_N(info), GST_VIDEO_INFO_FPS_D(info));
   return gint64(std::clamp(std::round(seconds * rate), 1.0, 1e12));
 }
 
@@ -517,53 +497,50 @@ static gboolean leave_parent(GstBuffer*, GstMeta** meta, gpointer) {
   return TRUE;
 }
 
-GstFlowReturn take_frame(GstElement* self, BufferPtr buffer) {
-  State* state = state_of(self);
+GstFlowReturn take_frame(State& state, BufferPtr buffer) {
   // The base class asks for frames until there is none, or until downstream refuses one (it has
   // ended, or is not linked); upstream may go on all the same. Nobody wants what is left.
-  if (state->engine.ready()) drop_frames(self);
+  if (state.engine.next()) drop_frames(state);
 
-  const GstClockTime came = time_now(self);
-  GST_OBJECT_LOCK(self);
-  const Settings settings = state->settings;
-  GST_OBJECT_UNLOCK(self);
-  const bool masks = settings.regions || state->wants_masks(settings);
+  const GstClockTime came = time_now(state.element);
+  GST_OBJECT_LOCK(state.element);
+  const Settings settings = state.settings;
+  GST_OBJECT_UNLOCK(state.element);
+  const bool masks = settings.regions || state.wants_masks(settings);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
       shell.get(), buffer.get(),
       GstBufferCopyFlags(GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_META),
       0, gsize(-1));
   gst_buffer_foreach_meta(shell.get(), leave_parent, nullptr);
-  NewSolves solves;
+  News news;
   {
-    const MappedVideoFrame frame(&state->info, buffer.get(), GST_MAP_READ);
+    const MappedVideoFrame frame(&state.info, buffer.get(), GST_MAP_READ);
     if (!frame) {
-      GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+      GST_ELEMENT_ERROR(state.element, STREAM, FORMAT,
                         ("A buffer does not hold a frame of the negotiated caps."), (nullptr));
       return GST_FLOW_ERROR;
     }
-    const bool taken = with_engine(self, [&](Engine& engine) {
+    const bool taken = with_engine(state, [&](Engine& engine) {
       const Clock::Span span(engine.clock(), Clock::frames);
-      state->shells.push(std::move(shell));
-      engine.set_freeze(settings.freeze);
-      engine.set_threads(settings.engine.threads);
-      engine.set_time_budget(settings.time_budget / 1000);
-      engine.set_masks_expected(masks);
-      engine.set_absorb_frames(absorb_frames(self, settings.absorb_time));
-      engine.set_ignored(ignored_of(settings, buffer.get()));
-      Status status = engine.push(frame.view<const uint8_t>());
-      if (status.ok()) solves = publish(self, 1, 0, nullptr);
+      state.shells.push(std::move(shell));
+      Wishes wishes = wishes_of(settings, buffer.get());
+      wishes.masks_expected = masks;
+      wishes.time_budget = settings.time_budget / 1000;
+      wishes.absorb_frames = absorb_frames(state, settings.absorb_time);
+      Status status = engine.push(frame.view<const uint8_t>(), &wishes);
+      if (status.ok()) news = publish(state, 1, 0, nullptr);
       return status;
     });
     if (!taken) {
-      drop_frames(self);
+      drop_frames(state);
       return GST_FLOW_ERROR;
     }
   }
-  tell_of_scene(self, GST_BUFFER_PTS(buffer.get()));
-  warn_of_no_room(self);
-  tell_of_solves(self, solves);
-  follow_latency(self, GST_BUFFER_PTS(buffer.get()), came);
+  tell_of_scene(state, news.engine, GST_BUFFER_PTS(buffer.get()));
+  warn_of_no_room(state, news.engine);
+  tell_of_solves(state, news);
+  follow_latency(state, news.engine.held_up, GST_BUFFER_PTS(buffer.get()), came);
   return GST_FLOW_OK;
 }
 

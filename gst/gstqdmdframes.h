@@ -9,24 +9,24 @@ namespace qdmd {
 // posted.
 
 // Makes the engine ready for frames of `info`. False: an error was posted.
-bool configure(GstElement* self, const Settings& settings, const GstVideoInfo& info, GstCaps* caps);
+bool configure(State& state, const Settings& settings, const GstVideoInfo& info, GstCaps* caps);
 // Gives all memory back.
-void close(GstElement* self);
+void close(State& state);
 // Drops what waits and forgets the background.
-void drop_frames(GstElement* self);
+void drop_frames(State& state);
 // Before a frame: what waits is sent where time breaks or somebody asked for a reset.
-GstFlowReturn prepare_for(GstElement* self, GstBuffer* input);
+GstFlowReturn prepare_for(State& state, GstBuffer* input);
 // Takes a frame of the negotiated caps.
-GstFlowReturn take_frame(GstElement* self, BufferPtr buffer);
+GstFlowReturn take_frame(State& state, BufferPtr buffer);
 // Takes an event that is about to be forwarded, and keeps it behind the frames that wait. False: it
 // is the caller's to forward now. Caps always are.
-bool hold_event(GstElement* self, GstEvent* event);
+bool hold_event(State& state, GstEvent* event);
 // Forwards events that were held behind frames which have left.
-void send_events(GstElement* self);
+void send_events(State& state);
 // Does that, and then makes the pictures that are wanted of the next ready frame, which has left by
 // then; none with OK where none is ready.
-GstFlowReturn next_pictures(GstElement* self, OutputPictures* pictures);
+GstFlowReturn next_pictures(State& state, OutputPictures* pictures);
 // Solves for what is left and pushes it; the next frame begins a new window.
-GstFlowReturn drain(GstElement* self);
+GstFlowReturn drain(State& state);
 
 }  // namespace qdmd

@@ -105,7 +105,7 @@ constexpr const char* kLoad = "load the background of";
 
 // With the engine lock: whether the video is one that it may be the background of.
 Problem check(const State& state, const Learnt& learnt) {
-  if (learnt.colours == state.colours) return problem(state.engine.may_learn_from(learnt));
+  if (learnt.colours == state.colours) return problem(state.engine.plan().may_learn_from(learnt));
   return Problem(g_strdup_printf(
       "it is the background of %s video and this video is %s: put videoconvert before the element, "
       "or save the background of such video.",
@@ -113,28 +113,27 @@ Problem check(const State& state, const Learnt& learnt) {
 }
 
 // With the engine lock.
-Problem give(State* state, const Learnt& learnt) {
-  if (Problem wrong = check(*state, learnt)) return wrong;
-  if (Problem wrong = problem(state->engine.learn_from(learnt))) return wrong;
+Problem give(State& state, const Learnt& learnt) {
+  if (Problem wrong = check(state, learnt)) return wrong;
+  if (Problem wrong = problem(state.engine.learn_from(learnt))) return wrong;
   // It belongs to no frame.
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
-  state->background.solved(segment, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
+  state.background.solved(segment, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
   return nullptr;
 }
 
 }  // namespace
 
-bool save_learnt(GstElement* self, const gchar* file) {
-  State* state = state_of(self);
+bool save_learnt(State& state, const gchar* file) {
   const Problem wrong = guarded([&]() -> Problem {
     if (!file || !*file) return problem("give it the name of a file.");
     Learnt learnt;
     bool known = false;
     {
-      const std::lock_guard lock(state->engine_lock);
-      known = state->engine.learnt(&learnt);
-      learnt.colours = state->colours;
+      const std::lock_guard lock(state.engine_lock);
+      known = state.engine.learnt(&learnt);
+      learnt.colours = state.colours;
     }
     if (!known)
       return problem(
@@ -143,82 +142,81 @@ bool save_learnt(GstElement* self, const gchar* file) {
   });
   const CharsPtr name = shown(file);
   if (wrong) {
-    post(self, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_WRITE, kSave, name.get(), wrong);
+    post(state.element, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_WRITE, kSave, name.get(),
+         wrong);
     return false;
   }
-  GST_INFO_OBJECT(self, "saved the background to \"%s\"", name.get());
+  GST_INFO_OBJECT(state.element, "saved the background to \"%s\"", name.get());
   return true;
 }
 
-bool load_learnt(GstElement* self, const gchar* file) {
-  State* state = state_of(self);
+bool load_learnt(State& state, const gchar* file) {
   const Problem wrong = guarded([&]() -> Problem {
     auto loaded = std::make_unique<Loaded>();
     if (Problem unread = read(file, &loaded->learnt)) return unread;
     loaded->file = shown(file);
-    const std::lock_guard lock(state->engine_lock);
-    const bool configured = state->engine.configured();
-    GST_OBJECT_LOCK(self);
-    const bool reset = configured && state->reset_asked;
+    const std::lock_guard lock(state.engine_lock);
+    const bool configured = state.engine.configured();
+    GST_OBJECT_LOCK(state.element);
+    const bool reset = configured && state.reset_asked;
     // There is nothing to forget yet.
-    if (!configured) state->reset_asked = false;
-    GST_OBJECT_UNLOCK(self);
+    if (!configured) state.reset_asked = false;
+    GST_OBJECT_UNLOCK(state.element);
     if (configured) {
       // What is to be forgotten first may still be in use.
       if (!reset) return give(state, loaded->learnt);
-      if (Problem unfit = check(*state, loaded->learnt)) return unfit;
+      if (Problem unfit = check(state, loaded->learnt)) return unfit;
     }
-    state->loaded.swap(loaded);
+    state.loaded.swap(loaded);
     return nullptr;
   });
   const CharsPtr name = shown(file);
   if (wrong) {
-    post(self, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_READ, kLoad, name.get(), wrong);
+    post(state.element, GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_OPEN_READ, kLoad, name.get(),
+         wrong);
     return false;
   }
-  GST_INFO_OBJECT(self, "loaded the background of \"%s\"", name.get());
+  GST_INFO_OBJECT(state.element, "loaded the background of \"%s\"", name.get());
   return true;
 }
 
-bool read_load_location(GstElement* self) {
-  State* state = state_of(self);
-  GST_OBJECT_LOCK(self);
-  const CharsPtr location(g_strdup(state->load_location.get()));
-  GST_OBJECT_UNLOCK(self);
+bool read_load_location(State& state) {
+  GST_OBJECT_LOCK(state.element);
+  const CharsPtr location(g_strdup(state.load_location.get()));
+  GST_OBJECT_UNLOCK(state.element);
   const Problem wrong = guarded([&]() -> Problem {
     {
       // What somebody loaded by the signal comes before it.
-      const std::lock_guard lock(state->engine_lock);
-      if (state->loaded && state->loaded->at_start) state->loaded.reset();
-      if (state->loaded || !location) return nullptr;
+      const std::lock_guard lock(state.engine_lock);
+      if (state.loaded && state.loaded->at_start) state.loaded.reset();
+      if (state.loaded || !location) return nullptr;
     }
     auto loaded = std::make_unique<Loaded>();
     if (Problem unread = read(location.get(), &loaded->learnt)) return unread;
     loaded->file = shown(location.get());
     loaded->at_start = true;
-    const std::lock_guard lock(state->engine_lock);
-    state->loaded.swap(loaded);
+    const std::lock_guard lock(state.engine_lock);
+    state.loaded.swap(loaded);
     return nullptr;
   });
   if (!wrong) return true;
-  post(self, GST_MESSAGE_ERROR, GST_RESOURCE_ERROR_OPEN_READ, kLoad, shown(location.get()).get(),
-       wrong);
+  post(state.element, GST_MESSAGE_ERROR, GST_RESOURCE_ERROR_OPEN_READ, kLoad,
+       shown(location.get()).get(), wrong);
   return false;
 }
 
-bool apply_loaded(GstElement* self) {
-  State* state = state_of(self);
+bool apply_loaded(State& state) {
   std::unique_ptr<Loaded> loaded;
   const Problem wrong = guarded([&]() -> Problem {
-    const std::lock_guard lock(state->engine_lock);
-    loaded = std::move(state->loaded);
+    const std::lock_guard lock(state.engine_lock);
+    loaded = std::move(state.loaded);
     return loaded ? give(state, loaded->learnt) : nullptr;
   });
   if (!wrong) return true;
   // Without what the user has set, the element does not start.
   const bool stop = loaded->at_start;
-  post(self, stop ? GST_MESSAGE_ERROR : GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_SETTINGS, kLoad,
-       loaded->file.get(), wrong);
+  post(state.element, stop ? GST_MESSAGE_ERROR : GST_MESSAGE_WARNING, GST_RESOURCE_ERROR_SETTINGS,
+       kLoad, loaded->file.get(), wrong);
   return !stop;
 }
 

@@ -8,13 +8,13 @@ namespace qdmd {
 // Calls are without locks. What goes wrong is posted, and changes nothing.
 
 // The signals, from any thread.
-bool save_learnt(GstElement* self, const gchar* file);
-bool load_learnt(GstElement* self, const gchar* file);
+bool save_learnt(State& state, const gchar* file);
+bool load_learnt(State& state, const gchar* file);
 
 // When the element starts. False: an error was posted.
-bool read_load_location(GstElement* self);
+bool read_load_location(State& state);
 // Gives what was loaded to the engine, once that is configured. From the streaming thread. False:
 // an error was posted.
-bool apply_loaded(GstElement* self);
+bool apply_loaded(State& state);
 
 }  // namespace qdmd

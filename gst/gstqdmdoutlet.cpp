@@ -75,7 +75,7 @@ bool has_format(const GstStructure* video, const char* name) {
   return has;
 }
 
-// The same video in the element's formats that `keep` says; nothing where there are none.
+// This video in the element's formats that `keep` says; nothing where there are none.
 template <typename Keep>
 void append_formats(GstCaps* caps, const GstStructure* video, Keep keep) {
   GValue list = G_VALUE_INIT;

@@ -44,7 +44,7 @@ void reopen_outlet(GstQdmdOutlet* outlet);
 void note_flow(GstQdmdOutlet* outlet, GstFlowReturn flow);
 // A buffer for a frame, with the metadata of `shell`. NOT_LINKED, EOS: nobody wants one.
 GstFlowReturn take_buffer(GstQdmdOutlet* outlet, GstBuffer* shell, BufferPtr* buffer);
-// Of the buffers.
+// The format of the buffers.
 const GstVideoInfo* info_of(const GstQdmdOutlet* outlet);
 
 }  // namespace qdmd

@@ -3,12 +3,12 @@
  * @title: qdmdseparate
  * @short_description: Separates background and foreground of video into several streams at once
  *
- * qdmdseparate does what #qdmdbackground does, with one window and one model for all pictures that
- * are wanted: each of its pads `background`, `foreground`, `mask` and `cutout`, requested and
- * released at any time, sends one buffer for each frame, with the frame's own timestamps, flags and
- * metadata. OutputPictures of one frame leave one after the other, so no pad is ahead of another by
- * more than a frame. A pad that is not linked costs nothing; one whose downstream has ended does
- * not stop the others.
+ * qdmdseparate does what #qdmdbackground does, by default with #GstQdmdSeparate:method `robust`,
+ * with one window and one model for all pictures that are wanted: each of its pads `background`,
+ * `foreground`, `mask` and `cutout`, requested and released at any time, sends one buffer for each
+ * frame, with the frame's own timestamps, flags and metadata. Pictures of one frame leave one after
+ * the other, so no pad is ahead of another by more than a frame. A pad that is not linked costs
+ * nothing; one whose downstream has ended does not stop the others.
  *
  * Each pad has caps of its own: the format of the input, or another layout of the same colours (RGB
  * as RGBA with a cut-out's transparency, I420 as NV12); masks may be GRAY8 beside any format.
@@ -35,7 +35,6 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <utility>
 
 #include "gst/gstqdmdelement.h"
@@ -71,7 +70,7 @@ using OutletPtr = std::unique_ptr<GstQdmdOutlet, UnrefOutlet>;
 class SeparateState : public qdmd::State {
  public:
   explicit SeparateState(GstElement* self)
-      : State(self, &segment_), self_(self), combiner_(gst_flow_combiner_new()) {
+      : State(self, &segment_), combiner_(gst_flow_combiner_new()) {
     gst_segment_init(&segment_, GST_FORMAT_UNDEFINED);
   }
   ~SeparateState() override { gst_flow_combiner_unref(combiner_); }
@@ -82,25 +81,25 @@ class SeparateState : public qdmd::State {
   void add(size_t kind, GstQdmdOutlet* outlet) {
     const std::lock_guard lock(combiner_lock_);
     gst_flow_combiner_add_pad(combiner_, GST_PAD(outlet));
-    GST_OBJECT_LOCK(self_);
+    GST_OBJECT_LOCK(element);
     outlets_[kind] = outlet;
-    GST_OBJECT_UNLOCK(self_);
+    GST_OBJECT_UNLOCK(element);
   }
   // Any thread. The caller holds a reference.
   void remove(GstQdmdOutlet* outlet) {
-    GST_OBJECT_LOCK(self_);
+    GST_OBJECT_LOCK(element);
     for (GstQdmdOutlet*& one : outlets_)
       if (one == outlet) one = nullptr;
-    GST_OBJECT_UNLOCK(self_);
+    GST_OBJECT_UNLOCK(element);
     const std::lock_guard lock(combiner_lock_);
     gst_flow_combiner_remove_pad(combiner_, GST_PAD(outlet));
   }
   // Any thread. Null: there is none.
   OutletPtr outlet(size_t kind) const {
-    GST_OBJECT_LOCK(self_);
+    GST_OBJECT_LOCK(element);
     GstQdmdOutlet* outlet = outlets_[kind];
     if (outlet) gst_object_ref(outlet);
-    GST_OBJECT_UNLOCK(self_);
+    GST_OBJECT_UNLOCK(element);
     return OutletPtr(outlet);
   }
   template <typename See>
@@ -165,7 +164,7 @@ class SeparateState : public qdmd::State {
   }
   void forward(qdmd::EventPtr event) override {
     sync();
-    gst_pad_event_default(sink, GST_OBJECT(self_), event.release());
+    gst_pad_event_default(sink, GST_OBJECT(element), event.release());
   }
   void keep(qdmd::EventPtr event) override {
     each([&](GstQdmdOutlet* outlet) { gst_pad_store_sticky_event(GST_PAD(outlet), event.get()); });
@@ -180,14 +179,13 @@ class SeparateState : public qdmd::State {
   };
 
   bool is_mine(const GstQdmdOutlet* outlet) const {
-    GST_OBJECT_LOCK(self_);
+    GST_OBJECT_LOCK(element);
     const bool mine =
         std::find(std::begin(outlets_), std::end(outlets_), outlet) != std::end(outlets_);
-    GST_OBJECT_UNLOCK(self_);
+    GST_OBJECT_UNLOCK(element);
     return mine;
   }
 
-  GstElement* const self_;
   // Protected by the object lock; the element's own.
   GstQdmdOutlet* outlets_[kCount] = {};
   // The object lock may be taken inside it.
@@ -205,9 +203,8 @@ class SeparateState : public qdmd::State {
 static_assert(alignof(SeparateState) <= 16);
 struct _GstQdmdSeparate {
   GstElement parent;
-  // In the instance's own memory, as qdmdbackground's.
-  SeparateState* state;
-  alignas(SeparateState) unsigned char room_of_state[sizeof(SeparateState)];
+  // As qdmdbackground's.
+  SeparateState state;
 };
 
 #define gst_qdmd_separate_parent_class parent_class
@@ -216,81 +213,78 @@ G_DEFINE_TYPE_WITH_CODE(GstQdmdSeparate, gst_qdmd_separate, GST_TYPE_ELEMENT,
                                                 "Q-DMD background separation, many pads"))
 GST_ELEMENT_REGISTER_DEFINE(qdmdseparate, "qdmdseparate", GST_RANK_NONE, GST_TYPE_QDMD_SEPARATE)
 
-static SeparateState* state_of(GstObject* element) { return GST_QDMD_SEPARATE(element)->state; }
+static SeparateState& state_of(gpointer element) { return GST_QDMD_SEPARATE(element)->state; }
 
 // ---- Frames -------------------------------------------------------------------------------------
 
 static GstFlowReturn gst_qdmd_separate_chain(GstPad*, GstObject* parent, GstBuffer* input) {
-  GstElement* self = GST_ELEMENT(parent);
-  SeparateState* state = state_of(parent);
+  SeparateState& state = state_of(parent);
   qdmd::BufferPtr buffer(input);
-  if (!state->engine.configured()) return GST_FLOW_NOT_NEGOTIATED;
-  GstFlowReturn flow = qdmd::prepare_for(self, input);
-  if (flow == GST_FLOW_OK) flow = qdmd::take_frame(self, std::move(buffer));
-  while (flow == GST_FLOW_OK && state->engine.ready()) {
+  if (!state.engine.configured()) return GST_FLOW_NOT_NEGOTIATED;
+  GstFlowReturn flow = qdmd::prepare_for(state, input);
+  if (flow == GST_FLOW_OK) flow = qdmd::take_frame(state, std::move(buffer));
+  while (flow == GST_FLOW_OK && state.engine.next()) {
     qdmd::OutputPictures pictures;
-    flow = qdmd::next_pictures(self, &pictures);
-    if (flow == GST_FLOW_OK) flow = state->send(&pictures);
+    flow = qdmd::next_pictures(state, &pictures);
+    if (flow == GST_FLOW_OK) flow = state.send(&pictures);
   }
-  qdmd::send_events(self);
+  qdmd::send_events(state);
   return flow;
 }
 
 // ---- Events -------------------------------------------------------------------------------------
 
-static gboolean gst_qdmd_separate_take_caps(GstElement* self, GstCaps* caps) {
-  SeparateState* state = state_of(GST_OBJECT(self));
-  const qdmd::CapsPtr before(gst_pad_get_current_caps(state->sink));
-  const bool same = before && state->engine.configured() && gst_caps_is_equal(before.get(), caps);
+static gboolean gst_qdmd_separate_take_caps(SeparateState& state, GstCaps* caps) {
+  const qdmd::CapsPtr before(gst_pad_get_current_caps(state.sink));
+  const bool same = before && state.engine.configured() && gst_caps_is_equal(before.get(), caps);
   if (same) return TRUE;
   // Frames that wait belong to the old caps.
-  qdmd::drain(self);
+  qdmd::drain(state);
   GstVideoInfo info;
   if (!gst_video_info_from_caps(&info, caps)) {
-    qdmd::tell_of_caps(self, caps);
+    qdmd::tell_of_caps(state.element, caps);
     return FALSE;
   }
-  if (!qdmd::begin_video(self, info, caps)) return FALSE;
-  state->sync();
-  state->each([caps](GstQdmdOutlet* outlet) { qdmd::negotiate_outlet(outlet, caps); });
+  if (!qdmd::begin_video(state, info, caps)) return FALSE;
+  state.sync();
+  state.each([caps](GstQdmdOutlet* outlet) { qdmd::negotiate_outlet(outlet, caps); });
   return TRUE;
 }
 
 static gboolean gst_qdmd_separate_sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
-  GstElement* self = GST_ELEMENT(parent);
-  SeparateState* state = state_of(parent);
+  SeparateState& state = state_of(parent);
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
-    const gboolean taken = gst_qdmd_separate_take_caps(self, caps);
+    const gboolean taken = gst_qdmd_separate_take_caps(state, caps);
     gst_event_unref(event);
     return taken;
   }
   // Others come from any thread.
   if (!GST_EVENT_IS_SERIALIZED(event)) return gst_pad_event_default(pad, parent, event);
 
-  qdmd::before_event(self, event);
+  qdmd::before_event(state, event);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT: {
       const GstSegment* segment = nullptr;
       gst_event_parse_segment(event, &segment);
-      state->set_segment(*segment);
-      state->each(qdmd::reopen_outlet);
+      state.set_segment(*segment);
+      state.each(qdmd::reopen_outlet);
       break;
     }
     case GST_EVENT_FLUSH_STOP: {
       GstSegment none;
       gst_segment_init(&none, GST_FORMAT_UNDEFINED);
-      state->set_segment(none);
-      state->forget_flows();
-      state->each(qdmd::reopen_outlet);
+      state.set_segment(none);
+      state.forget_flows();
+      state.each(qdmd::reopen_outlet);
       return gst_pad_event_default(pad, parent, event);
     }
     case GST_EVENT_STREAM_START:
-      state->forget_flows();
-      state->each([&](GstQdmdOutlet* outlet) {
+      state.forget_flows();
+      state.each([&](GstQdmdOutlet* outlet) {
         qdmd::reopen_outlet(outlet);
-        qdmd::sync_outlet(outlet, state->sink, state->shells);
+        qdmd::sync_outlet(outlet, state.sink, state.shells);
         qdmd::start_stream(outlet, event);
       });
       gst_event_unref(event);
@@ -298,8 +292,8 @@ static gboolean gst_qdmd_separate_sink_event(GstPad* pad, GstObject* parent, Gst
     default:
       break;
   }
-  if (qdmd::hold_event(self, event)) return TRUE;
-  state->sync();
+  if (qdmd::hold_event(state, event)) return TRUE;
+  state.sync();
   return gst_pad_event_default(pad, parent, event);
 }
 
@@ -313,10 +307,10 @@ static void answer_caps(GstQuery* query, qdmd::CapsPtr caps) {
 }
 
 // What every pad's downstream can be given something of.
-static void gst_qdmd_separate_answer_sink_caps(SeparateState* state, GstQuery* query) {
-  const qdmd::CapsPtr all(gst_pad_get_pad_template_caps(state->sink));
+static void gst_qdmd_separate_answer_sink_caps(SeparateState& state, GstQuery* query) {
+  const qdmd::CapsPtr all(gst_pad_get_pad_template_caps(state.sink));
   qdmd::CapsPtr caps(gst_caps_ref(all.get()));
-  state->each([&](GstQdmdOutlet* outlet) {
+  state.each([&](GstQdmdOutlet* outlet) {
     if (!gst_pad_is_linked(GST_PAD(outlet))) return;
     const qdmd::CapsPtr taken(gst_pad_peer_query_caps(GST_PAD(outlet), all.get()));
     const qdmd::CapsPtr needed(qdmd::caps_needed(qdmd::output_of(outlet), taken.get()));
@@ -326,17 +320,17 @@ static void gst_qdmd_separate_answer_sink_caps(SeparateState* state, GstQuery* q
   answer_caps(query, std::move(caps));
 }
 
-static void gst_qdmd_separate_answer_src_caps(SeparateState* state, GstPad* pad, GstQuery* query) {
-  qdmd::CapsPtr input(gst_pad_get_current_caps(state->sink));
-  const qdmd::CapsPtr all(gst_pad_get_pad_template_caps(state->sink));
-  if (!input) input.reset(gst_pad_peer_query_caps(state->sink, all.get()));
+static void gst_qdmd_separate_answer_src_caps(SeparateState& state, GstPad* pad, GstQuery* query) {
+  qdmd::CapsPtr input(gst_pad_get_current_caps(state.sink));
+  const qdmd::CapsPtr all(gst_pad_get_pad_template_caps(state.sink));
+  if (!input) input.reset(gst_pad_peer_query_caps(state.sink, all.get()));
   input.reset(gst_caps_intersect_full(input.get(), all.get(), GST_CAPS_INTERSECT_FIRST));
   const Output output = qdmd::output_of(GST_QDMD_OUTLET(pad));
   answer_caps(query, qdmd::CapsPtr(qdmd::caps_given(output, input.get())));
 }
 
 static gboolean gst_qdmd_separate_sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  SeparateState* state = state_of(parent);
+  SeparateState& state = state_of(parent);
   switch (GST_QUERY_TYPE(query)) {
     case GST_QUERY_CAPS:
       gst_qdmd_separate_answer_sink_caps(state, query);
@@ -351,10 +345,10 @@ static gboolean gst_qdmd_separate_sink_query(GstPad* pad, GstObject* parent, Gst
 }
 
 static gboolean gst_qdmd_separate_src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
-  SeparateState* state = state_of(parent);
+  SeparateState& state = state_of(parent);
   switch (GST_QUERY_TYPE(query)) {
     case GST_QUERY_LATENCY:
-      return qdmd::answer_latency(GST_ELEMENT(parent), state->sink, query);
+      return qdmd::answer_latency(state, state.sink, query);
     case GST_QUERY_CAPS:
       gst_qdmd_separate_answer_src_caps(state, pad, query);
       return TRUE;
@@ -367,11 +361,11 @@ static gboolean gst_qdmd_separate_src_query(GstPad* pad, GstObject* parent, GstQ
 
 static GstPad* gst_qdmd_separate_request_new_pad(GstElement* element, GstPadTemplate* its,
                                                  const gchar*, const GstCaps*) {
-  SeparateState* state = state_of(GST_OBJECT(element));
+  SeparateState& state = state_of(element);
   size_t kind = 0;
   while (g_strcmp0(kKinds[kind].name, GST_PAD_TEMPLATE_NAME_TEMPLATE(its)) != 0)
     if (++kind == kCount) return nullptr;
-  if (state->outlet(kind)) return nullptr;
+  if (state.outlet(kind)) return nullptr;
   GstPad* pad = qdmd::make_outlet(its, kKinds[kind].output);
   gst_pad_set_query_function(pad, gst_qdmd_separate_src_query);
   gst_pad_set_active(pad, TRUE);
@@ -381,14 +375,14 @@ static GstPad* gst_qdmd_separate_request_new_pad(GstElement* element, GstPadTemp
     gst_object_unref(pad);
     return nullptr;
   }
-  state->add(kind, GST_QDMD_OUTLET(pad));
+  state.add(kind, GST_QDMD_OUTLET(pad));
   gst_object_unref(pad);
   return pad;
 }
 
 static void gst_qdmd_separate_release_pad(GstElement* element, GstPad* pad) {
   gst_object_ref(pad);
-  state_of(GST_OBJECT(element))->remove(GST_QDMD_OUTLET(pad));
+  state_of(element).remove(GST_QDMD_OUTLET(pad));
   gst_pad_set_active(pad, FALSE);
   gst_element_remove_pad(element, pad);
   gst_object_unref(pad);
@@ -396,20 +390,20 @@ static void gst_qdmd_separate_release_pad(GstElement* element, GstPad* pad) {
 
 static GstStateChangeReturn gst_qdmd_separate_change_state(GstElement* element,
                                                            GstStateChange change) {
-  SeparateState* state = state_of(GST_OBJECT(element));
+  SeparateState& state = state_of(element);
   if (change == GST_STATE_CHANGE_READY_TO_PAUSED) {
-    state->forget_flows();
-    if (!qdmd::start(element)) return GST_STATE_CHANGE_FAILURE;
+    state.forget_flows();
+    if (!qdmd::start(state)) return GST_STATE_CHANGE_FAILURE;
   }
   const GstStateChangeReturn changed =
       GST_ELEMENT_CLASS(parent_class)->change_state(element, change);
   const bool failed = changed == GST_STATE_CHANGE_FAILURE;
   if (change == GST_STATE_CHANGE_PAUSED_TO_READY ||
       (change == GST_STATE_CHANGE_READY_TO_PAUSED && failed)) {
-    GST_PAD_STREAM_LOCK(state->sink);
-    qdmd::close(element);
-    state->each(qdmd::reset_outlet);
-    GST_PAD_STREAM_UNLOCK(state->sink);
+    GST_PAD_STREAM_LOCK(state.sink);
+    qdmd::close(state);
+    state.each(qdmd::reset_outlet);
+    GST_PAD_STREAM_UNLOCK(state.sink);
   }
   return changed;
 }
@@ -417,15 +411,15 @@ static GstStateChangeReturn gst_qdmd_separate_change_state(GstElement* element,
 // ---- Class --------------------------------------------------------------------------------------
 
 static void gst_qdmd_separate_finalize(GObject* object) {
-  std::destroy_at(GST_QDMD_SEPARATE(object)->state);
+  std::destroy_at(&GST_QDMD_SEPARATE(object)->state);
   G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_qdmd_separate_init(GstQdmdSeparate* self) {
   GstElement* element = GST_ELEMENT(self);
-  self->state = new (self->room_of_state) SeparateState(element);
+  std::construct_at(&self->state, element);
   GstPadTemplate* its = gst_element_class_get_pad_template(GST_ELEMENT_GET_CLASS(self), "sink");
-  GstPad* sink = self->state->sink = gst_pad_new_from_template(its, "sink");
+  GstPad* sink = self->state.sink = gst_pad_new_from_template(its, "sink");
   gst_pad_set_chain_function(sink, gst_qdmd_separate_chain);
   gst_pad_set_event_function(sink, gst_qdmd_separate_sink_event);
   gst_pad_set_query_function(sink, gst_qdmd_separate_sink_query);

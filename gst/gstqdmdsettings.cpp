@@ -144,9 +144,9 @@ const Property kProperties[] = {
                                   "Distance from the background, the length of the RGB difference "
                                   "in grey levels, above which a pixel is foreground (0: from the "
                                   "noise of the window, for robust of each pixel, at least 18)",
-                                  0, 442, d.engine.foreground_threshold, kControllable);
+                                  0, 442, d.wishes.foreground_threshold, kControllable);
      },
-     QDMD_DOUBLE(s.engine.foreground_threshold)},
+     QDMD_DOUBLE(s.wishes.foreground_threshold)},
     {[](const Settings& d) {
        return g_param_spec_uint64(
            "max-memory", "Maximum memory",
@@ -160,18 +160,18 @@ const Property kProperties[] = {
        return g_param_spec_uint("n-threads", "Number of threads",
                                 "Threads that work on a window (0: one for each core); the "
                                 "pictures are the same for any number",
-                                0, guint(EngineOptions::kMaxThreads), guint(d.engine.threads),
+                                0, guint(EngineOptions::kMaxThreads), guint(d.wishes.threads),
                                 kAnyTime);
      },
-     QDMD_UINT(s.engine.threads)},
+     QDMD_UINT(s.wishes.threads)},
     {[](const Settings& d) {
        return g_param_spec_boolean("freeze", "Freeze",
                                    "Keep the background as it is and do not solve. If there is no "
                                    "model yet, one is made first (mode=batch: from the next window "
                                    "on)",
-                                   d.freeze, kControllable);
+                                   d.wishes.freeze, kControllable);
      },
-     QDMD_BOOLEAN(s.freeze)},
+     QDMD_BOOLEAN(s.wishes.freeze)},
     {[](const Settings& d) {
        return g_param_spec_boolean("post-messages", "Post messages",
                                    "Post an element message `qdmdbackground` for each solve",
@@ -214,19 +214,19 @@ const Property kProperties[] = {
        return g_param_spec_enum("shadows", "Shadows",
                                 "What masks make of the background in another light: shadows, and "
                                 "floors that mirror",
-                                gst_qdmd_background_shadows_get_type(), gint(d.shadows),
+                                gst_qdmd_background_shadows_get_type(), gint(d.wishes.shadows),
                                 kControllable);
      },
-     QDMD_ENUM(s.shadows)},
+     QDMD_ENUM(s.wishes.shadows)},
     {[](const Settings& d) {
        return g_param_spec_uint("mask-softness", "Softness of masks",
                                 "Over how many pixels to either side the edge of a mask fades, in "
                                 "output=mask and cutout (0: hard). Soft edges follow the picture "
                                 "and are steady from frame to frame. Regions use the hard mask",
-                                0, guint(kMostSoftness), guint(d.engine.mask_softness),
+                                0, guint(kMostSoftness), guint(d.wishes.mask_softness),
                                 kControllable);
      },
-     QDMD_UINT(s.engine.mask_softness)},
+     QDMD_UINT(s.wishes.mask_softness)},
     {[](const Settings&) {
        return areas_spec("ignore", "Ignore",
                          "Rectangles `<<x,y,width,height>,...>` in pixels, 64 at most, in which "
@@ -235,10 +235,10 @@ const Property kProperties[] = {
                          kAnyTime);
      },
      [](Settings& s, const GValue* v) {
-       s.ignored = {};
-       s.ignored_left_out = add_areas_of(v, &s.ignored);
+       s.wishes.ignored = {};
+       s.ignored_left_out = add_areas_of(v, &s.wishes.ignored);
      },
-     [](const Settings& s, GValue* v) { areas_to(s.ignored, v); }},
+     [](const Settings& s, GValue* v) { areas_to(s.wishes.ignored, v); }},
     {[](const Settings&) {
        return g_param_spec_string(
            "ignore-roi-type", "Ignore regions of interest",
@@ -267,15 +267,15 @@ const Property kProperties[] = {
        return g_param_spec_boolean("stabilize-output", "Stabilize the output",
                                    "Send pictures as they would be if the camera stood still, in "
                                    "place of where it looks; alpha stays as it came",
-                                   d.stabilize_output, kControllable);
+                                   d.wishes.stabilize_output, kControllable);
      },
-     QDMD_BOOLEAN(s.stabilize_output)},
+     QDMD_BOOLEAN(s.wishes.stabilize_output)},
 };
 
 }  // namespace
 
 void install_settings(GObjectClass* klass, WhichSettings which) {
-  static_assert(std::size(kProperties) + 1 == kFirstFreeProperty);
+  static_assert(std::size(kProperties) < kMostSettings);
   const Settings defaults;
   guint id = 1;
   for (const Property& property : kProperties) {
@@ -289,14 +289,14 @@ void install_settings(GObjectClass* klass, WhichSettings which) {
 }
 
 bool set_setting(Settings* settings, guint id, const GValue* value) {
-  if (id < 1 || id >= kFirstFreeProperty) return false;
+  if (id < 1 || id > std::size(kProperties)) return false;
   kProperties[id - 1].set(*settings, value);
-  settings->asked |= 1u << id;
+  settings->asked.set(id);
   return true;
 }
 
 bool get_setting(const Settings& settings, guint id, GValue* value) {
-  if (id < 1 || id >= kFirstFreeProperty) return false;
+  if (id < 1 || id > std::size(kProperties)) return false;
   kProperties[id - 1].get(settings, value);
   return true;
 }

@@ -4,6 +4,7 @@
 #include <gst/video/video.h>
 
 #include <array>
+#include <bitset>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -53,8 +54,8 @@ class OutputPictures {
 
 class State {
  public:
-  // Of this element, whose input has this segment. They live as long as it does.
-  State(GstElement* element, const GstSegment* segment);
+  // The state of `its`, whose input has this segment. Both live as long as it does.
+  State(GstElement* its, const GstSegment* segment);
   virtual ~State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -74,6 +75,8 @@ class State {
   virtual void keep(EventPtr event) = 0;
   // Somebody takes frames after send() had this flow.
   virtual bool goes_on(GstFlowReturn flow) const { return flow == GST_FLOW_OK; }
+
+  GstElement* const element;
 
   // Protected by the object lock.
   Settings settings;
@@ -104,11 +107,8 @@ class State {
   guint breaks = 0;  // in time, one after another, with a frame between them
   bool warned_of_breaks = false, warned_of_no_room = false;
   bool camera_moved = false;                    // in the frame that left last
-  guint warned = 0;                             // settings without effect, a bit for each id
+  std::bitset<kMostSettings> warned;            // of settings without effect, a bit for each id
   GstClockTime next_pts = GST_CLOCK_TIME_NONE;  // where the frame after the newest is expected
 };
-
-// Of an element that made one.
-State* state_of(GstElement* self);
 
 }  // namespace qdmd

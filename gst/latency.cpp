@@ -47,7 +47,7 @@ bool Latency::frame_in(GstClockTime timestamp) {
     intervals_ = 1;
     return false;
   }
-  // Of `intervals_` frames since the first.
+  // The time of `intervals_` frames since the first.
   const guint64 intervals = intervals_++;
   if (intervals < kFirstLook || (intervals & (intervals - 1)) != 0) return false;
   const GstClockTime span = timestamp - first_,

@@ -41,7 +41,7 @@ class WaitingFrames {
     ++popped_;
     return buffer;
   }
-  // Those that are held go on when asked for.
+  // Events that are held go on when asked for.
   void clear() {
     while (!empty()) pop();
   }

@@ -6,7 +6,7 @@
 
 namespace qdmd {
 
-// Of a frame's pixels on the canvas, the picture that the camera saw in its place of rest: the
+// Where a frame lies on the canvas, the picture that the camera saw in its place of rest: the
 // frame's pixel f shows the canvas at c + shift + scale R(angle) (f - c), where c is the middle of
 // the picture and angles turn x towards y (clockwise, y being down).
 struct Pose {

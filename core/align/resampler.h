@@ -18,7 +18,7 @@ class Resampler {
   // resample() of whole pictures, both width x height: pixel p of `to` is at place(p).
   void run(const uint8_t* from, const Affine& place, uint8_t* to, int width, int height,
            Pool* pool);
-  // The same of samples of more than 8 bits, high digits and low ones; low planes are null
+  // As run(), for samples of more than 8 bits, high digits and low ones; low planes are null
   // where low_bits is 0.
   void run_deep(const uint8_t* from, const uint8_t* from_low, int low_bits, const Affine& place,
                 uint8_t* to, uint8_t* to_low, int width, int height, Pool* pool);

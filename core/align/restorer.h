@@ -22,11 +22,11 @@ class Restorer {
   // Takes a background's picture as it is on the canvas, which is `pixels` large. pool may be null.
   void write_canvas(const BackgroundModel& model, size_t pixels, Pool* pool);
   const uint8_t* canvas(int channel) const { return canvas_[static_cast<size_t>(channel)].get(); }
-  // The same picture seen from `pose`; frame, low: the frame's own planes.
+  // Makes that picture as seen from `pose`; frame, low: the frame's own planes.
   void restore_level(const Pose& pose, const uint8_t* const frame[3], const uint8_t* const low[3],
                      Resampler* resampler, Pool* pool);
   const uint8_t* level(int channel) const { return level_[static_cast<size_t>(channel)].get(); }
-  // Its low digits, or null.
+  // The low digits of level(), or null.
   const uint8_t* level_low(int channel) const {
     return level_low_[static_cast<size_t>(channel)].get();
   }
@@ -36,7 +36,7 @@ class Restorer {
                         Pool* pool) {
     return restore(pose, mask, hard, resampler, pool, mask_.get());
   }
-  // The same of a second one.
+  // As restore_mask(), a second mask.
   uint8_t* restore_shaded(const Pose& pose, const uint8_t* shaded, Resampler* resampler,
                           Pool* pool) {
     return restore(pose, shaded, true, resampler, pool, shaded_.get());

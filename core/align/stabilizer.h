@@ -51,8 +51,6 @@ class Stabilizer {
   // Where the camera looked in the newest frame. Frames are moved only once the camera was further
   // off than the width of an edge: for less, interpolation would blur more than the motion does.
   const Pose& motion() const { return pose_; }
-  // Frames in a row that showed too little of the scene, the newest included.
-  int lost() const { return lost_; }
   // How often the camera went on to another view.
   uint64_t views() const { return views_; }
   Resampler& resampler() { return resampler_; }

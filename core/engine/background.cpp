@@ -98,15 +98,16 @@ void Background::begin(const SnapshotRange& snapshots) {
 
 void Background::build(Slice slice) { learner_->build(slice, &models_[next()]); }
 
-void Background::finish(const MaskWishes& wishes) {
+void Background::finish(const Wishes& wishes) {
   const Clock::Span span(*room_.clock, Clock::pictures);
   static_cast<SolveFacts&>(next_report_) = learner_->facts();
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
   next_report_.foreground =
-      foreground_statistics(*snapshots_, models_[next()], wishes.threshold, *room_.pool,
+      foreground_statistics(*snapshots_, models_[next()], wishes.foreground_threshold, *room_.pool,
                             wishes.ignored, room_.frames->width(), room_.frames->band());
   // Nobody decides before there is a first model.
-  if (wishes.expected && room_.models != Models::two_of_live && !known_ && decision_.new_born())
+  if (wishes.masks_expected && room_.models != Models::two_of_live && !known_ &&
+      decision_.new_born())
     rehearse(wishes);
 }
 
@@ -127,9 +128,9 @@ void Background::replace_next() {
 }
 
 // What moves is known before the first frame of a stream is decided.
-void Background::rehearse(const MaskWishes& wishes) {
+void Background::rehearse(const Wishes& wishes) {
   constexpr int kEvery = 4;
-  const bool fixed = wishes.threshold > 0;
+  const bool fixed = wishes.foreground_threshold > 0;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
   const SnapshotRange whole = room_.frames->whole(*snapshots_);
@@ -153,7 +154,7 @@ void Background::rehearse(const MaskWishes& wishes) {
 }
 
 void Background::decide(const PlaneRows& x, const PlaneRows* low, Pool* pool) {
-  const bool fixed = wishes_.threshold > 0;
+  const bool fixed = wishes_.foreground_threshold > 0;
   decide({{},
           &model(),
           report_.foreground.threshold,
@@ -198,11 +199,12 @@ void Background::follow_light(int slot) {
   if (learner_->follows_light()) model().set_light(learner_->light(slot));
 }
 
-void Background::set_wishes(const MaskWishes& wishes) {
+void Background::set_wishes(const Wishes& wishes) {
   wishes_ = wishes;
+  learner_->set_absorb_frames(wishes.absorb_frames);
   ForegroundStatistics& foreground = report_.foreground;
-  foreground.threshold =
-      wishes.threshold > 0 ? wishes.threshold : automatic_threshold(foreground.noise);
+  const double threshold = wishes.foreground_threshold;
+  foreground.threshold = threshold > 0 ? threshold : automatic_threshold(foreground.noise);
 }
 
 }  // namespace qdmd

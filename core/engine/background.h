@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/engine/wishes.h"
 #include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
 #include "core/learn/learner.h"
@@ -14,14 +15,6 @@ namespace qdmd {
 // About the newest solve.
 struct SolveReport : SolveFacts {
   ForegroundStatistics foreground;
-};
-
-// What callers want of frames' masks.
-struct MaskWishes {
-  double threshold = 0;  // a pixel differs above this quaternion norm; 0: from the noise
-  bool expected = true;  // somebody is going to look at them
-  IgnoredAreas ignored = {};
-  Shadows shadows = Shadows::background;  // what the background in another light becomes
 };
 
 // Owns a learner and its models. begin(), build() and finish() make the next model, from any
@@ -40,7 +33,7 @@ class Background {
   void forget();
   // Learner::begin_scene(); masks begin anew with the next publish().
   void begin_scene();
-  // The same, and there is no background until then.
+  // As begin_scene(), and there is no background until that publish().
   void begin_scene_at_once();
   // The camera shows the scene of `learnt` again: its background is in use, in the light of each
   // frame. If it throws, nothing is known.
@@ -63,7 +56,7 @@ class Background {
   // Learner::build().
   void build(Slice slice);
   // After the last slice. wishes: as they were when the work began.
-  void finish(const MaskWishes& wishes);
+  void finish(const Wishes& wishes);
   // Learnt again.
   void publish();
 
@@ -80,8 +73,6 @@ class Background {
   // Holds L(t) at this time t, or goes on holding L in another state. The snapshots are no longer
   // needed then.
   void hold(double t, State state);
-  // L is as it is until publish(), but held no longer.
-  void learn() { state_ = State::learnt; }
   // Learner::mend(), of the L in use.
   void mend(const Learner::Compared& frame) { learner_->mend(frame, &model()); }
   // Learner::look_ahead(), of the L in use. used: frames wait that it is the background of.
@@ -99,12 +90,13 @@ class Background {
   Decision& decision() { return decision_; }
   const Decision& decision() const { return decision_; }
 
-  void set_wishes(const MaskWishes& wishes);
-  const MaskWishes& wishes() const { return wishes_; }
+  // They hold from now on, for masks and for what is learnt.
+  void set_wishes(const Wishes& wishes);
+  const Wishes& wishes() const { return wishes_; }
 
  private:
   void replace_next();
-  void rehearse(const MaskWishes& wishes);
+  void rehearse(const Wishes& wishes);
   void decide(Comparison frame, const PlaneRows& x, const PlaneRows* low, Pool* pool);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
@@ -112,7 +104,7 @@ class Background {
   LearnerRoom room_;
   std::unique_ptr<Learner> learner_;
   Decision decision_;
-  // Of two, one is in use while the next is built.
+  // If there are two, one is in use while the next is built.
   BackgroundModel models_[2];
   int newest_ = 0;
   std::optional<SnapshotRange> snapshots_;  // of the next
@@ -120,7 +112,7 @@ class Background {
   State state_ = State::learnt;
   bool known_ = false, scene_begins_ = false;
   uint64_t solves_ = 0;
-  MaskWishes wishes_;
+  Wishes wishes_;
 };
 
 }  // namespace qdmd

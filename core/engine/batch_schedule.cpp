@@ -18,14 +18,14 @@ constexpr int kGroup = 16;
 BatchSchedule::BatchSchedule(const Stage& stage, int window_size, int late_frames)
     : Schedule(stage), window_size_(window_size), late_frames_(late_frames) {}
 
-bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
-  if (queue->pending == 0) begin_stream();
+bool BatchSchedule::take_in(const ImageView& frame) {
+  if (queue_.pending == 0) begin_stream();
   if (!collection_) {
-    collection_ = Collection{taken(), freeze};
+    collection_ = Collection{taken(), freeze()};
     if (!waiting_) decide();
   }
   if (!take(frame)) return false;
-  ++queue->pending;
+  ++queue_.pending;
   ++collection_->not_added;
   if (!collection_->freeze && scene_seen() != SceneSeen::same)
     collection_->scene = std::max(collection_->begin, taken() - Learner::kSceneFrames);
@@ -36,26 +36,26 @@ bool BatchSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
              collection_->not_added >= std::min(kGroup, window_size_)) {
     add_group();
   }
-  if (queue->pending >= window_size_ + late_frames_) {
-    queue->ready = 1;
-    if (next_to_leave(*queue) == shown_.end) advance();
+  if (queue_.pending >= window_size_ + late_frames_) {
+    queue_.ready = 1;
+    if (next_to_leave() == shown_.end) advance();
   }
-  look_ahead(*queue, freeze);
+  look_ahead();
   return true;
 }
 
 // With the newest frame: it may show what is behind the background of those that wait.
-void BatchSchedule::look_ahead(const Queue& queue, bool freeze) {
+void BatchSchedule::look_ahead() {
   const int count = std::min(frames().size(), Learner::kMendingFrames);
-  const int64_t next = next_to_leave(queue);
+  const int64_t next = next_to_leave();
   // What somebody is about to hold, or what was loaded, stays as it is.
   const auto learns = [](const auto& window) { return !window || window->state == State::learnt; };
-  const bool used = next < shown_.end && !freeze && !loaded_ && learns(waiting_) &&
+  const bool used = next < shown_.end && !freeze() && !loaded_ && learns(waiting_) &&
                     learns(collection_) &&
                     !(collection_ && (collection_->freeze || collection_->scene));
-  background().look_ahead({SnapshotRange(frames().window()).newest(count), count - 1, taken() - 1,
-                           static_cast<double>(next - shown_.time_zero)},
-                          used);
+  background().look_ahead(
+      {SnapshotRange(frames().window()).newest(count), count - 1, taken() - 1, time_of(next)},
+      used);
 }
 
 // No frame waits.
@@ -111,7 +111,7 @@ void BatchSchedule::end_window(bool at_once) {
       static_cast<int>(std::min<int64_t>({window_size_, frames().size(), taken() - from}));
   const SnapshotRange span = SnapshotRange(frames().window()).newest(size);
   waiting_->time_zero = taken() - size;
-  // Of frames before another scene nothing is wanted.
+  // Nothing is wanted of frames before another scene.
   work_ =
       Work{span, count < size ? count : std::min(window.not_added, size), background().wishes()};
   // Reads how many frames there are.
@@ -149,7 +149,7 @@ void BatchSchedule::solve() {
 
 // The last frame of a window has left: the background of the next comes into use.
 void BatchSchedule::advance() {
-  // Of a window that ended early.
+  // It is that of a window that ended early.
   if (!waiting_) end_window(true);
   const Stretch next = *waiting_;
   if (next.state == State::learnt) {
@@ -176,12 +176,12 @@ void BatchSchedule::end_early() {
   if (collection_ && !waiting_ && late_frames_ > 0) end_window(false);
 }
 
-void BatchSchedule::drain(Queue* queue) {
+void BatchSchedule::drain() {
   break_ = true;
-  if (queue->pending == 0) return;
-  queue->ready = queue->pending;
+  if (queue_.pending == 0) return;
+  queue_.ready = queue_.pending;
   end_early();
-  if (next_to_leave(*queue) == shown_.end) advance();
+  if (next_to_leave() == shown_.end) advance();
 }
 
 void BatchSchedule::restart() {
@@ -197,11 +197,11 @@ void BatchSchedule::restart() {
 }
 
 // Frames that wait have their background, or their window is about to be solved.
-void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
-  const bool shown = !background().known() || queue.pending == 0;
+void BatchSchedule::learn_from(const Learnt& learnt) {
+  const bool shown = !background().known() || queue_.pending == 0;
   std::optional<Loaded> loaded;
   if (shown) background().make_room();
-  if (queue.pending > 0) {
+  if (queue_.pending > 0) {
     loaded = Loaded{learnt, taken()};
     // Others are told of that.
     loaded->learnt.earlier.reset();
@@ -212,30 +212,33 @@ void BatchSchedule::learn_from(const Learnt& learnt, const Queue& queue) {
 }
 
 // Windows come one after the other, also where nobody looks at a window's first frame.
-void BatchSchedule::leave(const Queue& queue) {
-  if (next_to_leave(queue) == shown_.end) advance();
+void BatchSchedule::pass() {
+  if (next_to_leave() == shown_.end) advance();
+}
+
+void BatchSchedule::meet(int index) {
+  const int64_t frame = kept_from() + index;
+  if (frame == shown_.end) advance();
+  if (background().state() != State::learnt) return;
+  if (frame >= shown_.hold_from) {
+    background().hold(background().report().window_frames - 1, State::held_in_light);
+    return;
+  }
+  const int count = std::min(frames().size() - index, Learner::kMendingFrames);
+  background().mend({{frames().window(), index, count}, 0, frame, time_of(frame)});
 }
 
 void BatchSchedule::show(int index) {
-  const int64_t frame = kept_from() + index;
-  if (frame == shown_.end) advance();
-  const auto time = static_cast<double>(frame - shown_.time_zero);
-  if (frame >= shown_.hold_from && background().state() == State::learnt)
-    background().hold(background().report().window_frames - 1, State::held_in_light);
   if (background().state() == State::held_in_light) background().follow_light(frames().slot(index));
-  if (background().state() == State::learnt) {
-    const int count = std::min(frames().size() - index, Learner::kMendingFrames);
-    background().mend({{frames().window(), index, count}, 0, frame, time});
-  }
-  background().model().set_time(time);
+  background().model().set_time(time_of(kept_from() + index));
 }
 
 void BatchSchedule::show_newest() {
   background().model().set_time(background().report().window_frames - 1);
 }
 
-int BatchSchedule::frames_left(const Queue& queue) const {
-  return static_cast<int>(std::max<int64_t>(0, shown_.end - next_to_leave(queue)));
+int BatchSchedule::frames_left() const {
+  return static_cast<int>(std::max<int64_t>(0, shown_.end - next_to_leave()));
 }
 
 }  // namespace qdmd

@@ -20,15 +20,18 @@ class BatchSchedule : public Schedule {
   // late_frames < window_size.
   BatchSchedule(const Stage& stage, int window_size, int late_frames);
 
-  bool push(const ImageView& frame, bool freeze, Queue* queue) override;
-  void drain(Queue* queue) override;
+  void drain() override;
   void go_on() override { break_ = false; }
-  void restart() override;
-  void learn_from(const Learnt& learnt, const Queue& queue) override;
-  void leave(const Queue& queue) override;
+  void learn_from(const Learnt& learnt) override;
+  void meet(int index) override;
   void show(int index) override;
   void show_newest() override;
-  int frames_left(const Queue& queue) const override;
+  int frames_left() const override;
+
+ protected:
+  bool take_in(const ImageView& frame) override;
+  void restart() override;
+  void pass() override;
 
  private:
   // Frames [begin, end) that leave with one background, by their numbers in the store.
@@ -56,19 +59,20 @@ class BatchSchedule : public Schedule {
   struct Work {
     SnapshotRange span;
     int fresh;  // newest frames that enter the Gram matrix
-    MaskWishes wishes = {};
+    Wishes wishes = {};
   };
 
-  // Those of an earlier window are not known to be moved: they have their background.
+  // Frames of an earlier window are not known to be moved: they have their background.
   bool holds_frames() const override {
     return collection_ && collection_->begin + frames().size() == taken();
   }
   int64_t taken() const { return static_cast<int64_t>(frames().frames_taken()); }
   int64_t kept_from() const { return taken() - frames().size(); }
   int collected() const { return collection_ ? static_cast<int>(taken() - collection_->begin) : 0; }
-  int64_t next_to_leave(const Queue& queue) const { return taken() - queue.pending; }
+  int64_t next_to_leave() const { return taken() - queue_.pending; }
+  double time_of(int64_t frame) const { return static_cast<double>(frame - shown_.time_zero); }
 
-  void look_ahead(const Queue& queue, bool freeze);
+  void look_ahead();
   void begin_stream();
   void decide();
   void add_group();

@@ -45,7 +45,7 @@ class LivePlan {
  private:
   int slices(int64_t snapshots) const;
   int most_slices() const { return slices(window_size_); }
-  // Of the groups of a whole hop.
+  // Frames of the largest group of a whole hop.
   int largest_group() const;
   void plan(int64_t next_solve);
 

@@ -14,8 +14,8 @@ using Seconds = std::chrono::duration<double>;
 LiveSchedule::LiveSchedule(const Stage& stage, const LivePlan& plan)
     : Schedule(stage), plan_(plan) {}
 
-bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
-  const bool frozen = freeze && background().known();
+bool LiveSchedule::take_in(const ImageView& frame) {
+  const bool frozen = freeze() && background().known();
   const uint64_t solves = background().solves();
   if (frozen)
     pace().solve_next();
@@ -40,7 +40,7 @@ bool LiveSchedule::push(const ImageView& frame, bool freeze, Queue* queue) {
   if (background().state() == State::learnt && background().known()) mend();
   if (background().solves() > solves) published_ = {time(), background().model().light(time())};
   pace().count_frame();
-  queue->pending = queue->ready = 1;
+  queue_ = {1, 1};
   return true;
 }
 
@@ -152,8 +152,8 @@ void LiveSchedule::work() {
   }
 }
 
-void LiveSchedule::drain(Queue* queue) {
-  queue->ready = queue->pending;
+void LiveSchedule::drain() {
+  queue_.ready = queue_.pending;
   start_new_window_ = true;
 }
 
@@ -181,7 +181,7 @@ void LiveSchedule::restart() {
 }
 
 // What is under way is about other frames: the next one begins a new window.
-void LiveSchedule::learn_from(const Learnt& learnt, const Queue&) {
+void LiveSchedule::learn_from(const Learnt& learnt) {
   background().make_room();
   background().recall(learnt);
   stop();

@@ -16,13 +16,15 @@ class LiveSchedule : public Schedule {
  public:
   LiveSchedule(const Stage& stage, const LivePlan& plan);
 
-  bool push(const ImageView& frame, bool freeze, Queue* queue) override;
-  void drain(Queue* queue) override;
-  void restart() override;
-  void learn_from(const Learnt& learnt, const Queue& queue) override;
+  void drain() override;
+  void learn_from(const Learnt& learnt) override;
   void show(int index) override;
   void show_newest() override;
-  int frames_left(const Queue& queue) const override { return queue.pending; }
+  int frames_left() const override { return queue_.pending; }
+
+ protected:
+  bool take_in(const ImageView& frame) override;
+  void restart() override;
 
  private:
   // A group of frames on its way into the Gram matrix.
@@ -47,7 +49,7 @@ class LiveSchedule : public Schedule {
     double estimate;  // Learner::solve_seconds()
   };
 
-  // Of the newest frame.
+  // What the model is set to for a frame.
   struct Moment {
     double time = 0;
     Gain light = kSameLight;
@@ -76,7 +78,7 @@ class LiveSchedule : public Schedule {
   std::optional<GramGroup> group_;
   std::optional<Build> build_;
   std::optional<int64_t> finished_;  // first frame of a solve that waits to be published
-  MaskWishes wishes_;                // as they were when the work began
+  Wishes wishes_;                    // as they were when the work began
   std::optional<Learnt> left_;       // of the scene that the camera showed before
 };
 

@@ -32,7 +32,7 @@ class Pace {
  private:
   const Clock* clock_;
   TimeBudget budget_;
-  // Of the stretch that runs.
+  // When the stretch that runs began, its frames so far, and whether it is solved.
   Clock::Spent start_;
   int frames_ = 0;
   bool solves_ = true;

@@ -22,7 +22,7 @@ struct Stage {
   Workers* workers;
   Pace* pace;
   Clock* clock;
-  // Of a camera that may move; or null, both.
+  // Where the camera may move; or null, both.
   Stabilizer* stabilizer = nullptr;
   Restorer* restorer = nullptr;
 };
@@ -34,7 +34,7 @@ struct Queue {
 };
 
 // Frames go in, and are ready with the background of their time. May throw std::bad_alloc; what
-// waits is lost then, and restart() comes next.
+// waits is lost then, and flush() comes next.
 class Schedule {
  public:
   explicit Schedule(const Stage& stage) : stage_(stage) {}
@@ -42,39 +42,60 @@ class Schedule {
   Schedule(const Schedule&) = delete;
   Schedule& operator=(const Schedule&) = delete;
 
-  // Takes a frame in. freeze: the background is held once there is one. False: the frame has alpha
-  // for which there is no room (FrameStore::append).
-  virtual bool push(const ImageView& frame, bool freeze, Queue* queue) = 0;
-  // Before each push().
-  void begin_push() { held_up_ = false; }
+  const Queue& queue() const { return queue_; }
+  // In the store: the frame that leaves next, while one waits.
+  int next_index() const { return frames().size() - queue_.pending; }
+
+  // Takes a frame in. False: the frame has alpha for which there is no room (FrameStore::append).
+  bool push(const ImageView& frame) {
+    held_up_ = false;
+    return take_in(frame);
+  }
   // Work of a solve was done in the newest push(), or waited for.
   bool held_up() const { return held_up_; }
   // How often frames showed another scene than the background (Learner::scene_of), so
   // that learning began anew.
   uint64_t scenes() const { return scenes_; }
   // All that waits becomes ready. The next frame begins a new window.
-  virtual void drain(Queue* queue) = 0;
+  virtual void drain() = 0;
   // After drain(), when all frames have left: the next frame comes after the one before it, after
   // all.
   virtual void go_on() {}
-  // Drops the work that is under way, and all frames. The background is forgotten, too.
-  virtual void restart() = 0;
+  // Drops the work that is under way, and all frames, and forgets the background.
+  void flush() {
+    queue_ = {};
+    restart();
+    background().forget();
+    pace().restart();
+  }
   // What an earlier run learnt, of frames of this size, no solve being under way. No frame is lost.
   // Where it throws, all is as it was.
-  virtual void learn_from(const Learnt& learnt, const Queue& queue) = 0;
-  // The next frame is about to leave, whether anybody asked for its pictures or not.
-  virtual void leave(const Queue&) {}
+  virtual void learn_from(const Learnt& learnt) = 0;
+  // Once for each frame that somebody wants pictures of, before show(): its background comes into
+  // use, which may wait for a solve or do it, and is mended by what the frame shows.
+  virtual void meet(int /*index*/) {}
   // Sets the model to the time, and the light, of frame `index` of the store.
   virtual void show(int index) = 0;
-  // The same for the newest background.
+  // Sets it to those of the frame with which the newest background came.
   virtual void show_newest() = 0;
+  // The next frame leaves, whether anybody asked for its pictures or not.
+  void leave() {
+    pass();
+    --queue_.pending;
+    --queue_.ready;
+  }
   // There is no room in max-memory for frames before and after they were moved to the canvas: they
   // stay as they come.
   bool has_no_room() const { return no_room_; }
-  // Of the frames that wait, the next so many leave with the background in use.
-  virtual int frames_left(const Queue& queue) const = 0;
+  // The next so many of the frames that wait leave with the background in use.
+  virtual int frames_left() const = 0;
 
  protected:
+  // See push(), flush() and leave().
+  virtual bool take_in(const ImageView& frame) = 0;
+  virtual void restart() = 0;
+  virtual void pass() {}
+  bool freeze() const { return background().wishes().freeze; }
   // Copies a frame in, and moves it to where the camera saw the background. False:
   // FrameStore::append.
   bool take(const ImageView& frame);
@@ -85,8 +106,6 @@ class Schedule {
     if (stage_.stabilizer) stage_.stabilizer->forget();
     referred_to_ = 0;
   }
-  // Frames are compared with another background, from the next one on.
-  void refer_anew() { referred_to_ = 0; }
   Pool* idle_pool() const { return workers().idle_pool(); }
 
   FrameStore& frames() const { return *stage_.frames; }
@@ -118,6 +137,8 @@ class Schedule {
   }
   // For work of a solve that is done at once.
   void hold_up() { held_up_ = true; }
+
+  Queue queue_;
 
  private:
   bool wants_reference(const Stabilizer& stabilizer);

@@ -76,11 +76,11 @@ class TimeBudget {
   // stretch that ended early says little about others: its time counts, but no cost is learnt.
   void add(int frames, double seconds, const SolveCost& solve);
 
-  // Of the stretches from now on.
+  // What the stretches from now on get.
   Effort effort() const { return front_.empty() ? Effort() : front_[chosen_]; }
-  // The cost model: seconds for each frame with that effort; 0 as long as nothing was measured.
+  // What was learnt of the seconds that frames take.
+  const CostModel& costs() const { return model_; }
   double predicted(const Effort& effort) const { return model_.predicted(effort); }
-  double predicted() const { return predicted(effort()); }
 
  private:
   void choose();

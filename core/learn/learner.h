@@ -115,9 +115,9 @@ class Learner {
 
   // ---- What was uncovered, and what stays ----
 
-  // Before each frame is compared with the background in use, `model`. Where frames show that
-  // something has left that the model took for background (live), or that something which came
-  // stood still for the time to absorb, the model has what they show from now on.
+  // Once for each frame, before it is compared with the background in use, `model`. Where frames
+  // show that something has left that the model took for background (live), or that something which
+  // came stood still for the time to absorb, the model has what they show from now on.
   static constexpr int kMendingFrames = 9;
   struct Compared {
     SnapshotRange around;  // the frame, and others that come next to it, kMendingFrames at most

@@ -49,18 +49,21 @@ void check(const Status& status) {
 }  // namespace
 
 struct Separator::State {
-  explicit State(const Options& o) : options(o) {}
+  explicit State(const Options& o) : options(o) {
+    wishes = first_wishes(engine_options(options));
+    wishes.absorb_frames = options.absorb_frames;
+  }
 
   void configure(int w, int h) {
     if (engine.configured() && w == width && h == height) return;
     engine.close();
     width = height = 0;
     check(engine.configure(engine_options(options), w, h));
-    engine.set_absorb_frames(options.absorb_frames);
     width = w, height = h;
   }
 
   Options options;
+  Wishes wishes;
   Engine engine;
   int width = 0, height = 0;
 };
@@ -68,7 +71,7 @@ struct Separator::State {
 Separator::Separator(const Options& options) : state_(std::make_unique<State>(options)) {
   if (options.absorb_frames < 0)
     throw std::invalid_argument("absorb_frames must be 0 (never) or more");
-  check(check_options(engine_options(options), 1, 1));
+  check(EnginePlan(engine_options(options), 1, 1).status());
 }
 Separator::~Separator() = default;
 Separator::Separator(Separator&&) noexcept = default;
@@ -78,7 +81,7 @@ void Separator::apply(const uint8_t* frame, const Layout& layout, uint8_t* mask,
                       ptrdiff_t mask_row_bytes) {
   state_->configure(layout.width, layout.height);
   Engine& engine = state_->engine;
-  check(engine.push(view_of(frame, layout)));
+  check(engine.push(view_of(frame, layout), &state_->wishes));
   // One plane stands for all three channels.
   MutableImageView out;
   for (uint8_t*& channel : out.channel) channel = mask;
@@ -86,7 +89,7 @@ void Separator::apply(const uint8_t* frame, const Layout& layout, uint8_t* mask,
   out.height = layout.height;
   out.pixel_stride = 1;
   out.row_stride = mask_row_bytes;
-  engine.pop(Output::mask, out);
+  engine.next()->pop(Output::mask, out);
 }
 
 bool Separator::background(const Layout& layout, uint8_t* picture) {
@@ -94,6 +97,6 @@ bool Separator::background(const Layout& layout, uint8_t* picture) {
   return state_->engine.write_background(view_of(picture, layout));
 }
 
-void Separator::freeze(bool freeze) { state_->engine.set_freeze(freeze); }
+void Separator::freeze(bool freeze) { state_->wishes.freeze = freeze; }
 
 }  // namespace qdmd::library

@@ -78,6 +78,7 @@ class Job {
         line_(options.quiet || !writes()) {
     progress_path_ = progress_of(options.wanted.front().path);
     engine_options_ = options.engine;
+    engine_options_.shadows = options.shadows;
     engine_options_.team = team;
     engine_options_.remembers = false;
     done_.settings = settings_of(options);
@@ -123,15 +124,15 @@ class Job {
 
   bool writes() const { return !team_ || team_->rank() == 0; }
   int64_t window_size() const { return engine_options_.window_size; }
+  const Band& band() const { return engine_.plan().band(); }
 
   // From the streaming thread, before there is a frame.
   Rows choose(const RecordingInfo& info) {
     EngineOptions options = engine_options_;
     set_format(info.picture, &options);
-    const Status status = check_options(options, info.width, info.height);
-    if (!status.ok()) throw std::invalid_argument(status.message);
-    const Band band = band_of(options, info.width, info.height);
-    return {band.first(), band.rows()};
+    const EnginePlan plan(options, info.width, info.height);
+    if (!plan.status().ok()) throw std::invalid_argument(plan.status().message);
+    return {plan.band().first(), plan.band().rows()};
   }
 
   bool next_frame() {
@@ -168,13 +169,13 @@ class Job {
     set_format(info.picture, &engine_options_);
     const Status status = engine_.configure(engine_options_, info.width, info.height);
     if (!status.ok()) throw std::invalid_argument(status.message);
+    wishes_ = first_wishes(engine_options_);
     if (options_.absorb_time > 0)
-      engine_.set_absorb_frames(static_cast<int64_t>(
-          std::clamp(std::round(options_.absorb_time * info.rate), 1.0, 1e12)));
-    engine_.set_shadows(options_.shadows);
-    engine_.set_masks_expected(wants_masks());
-    picture_.emplace(info.picture, engine_.band().rows(), writes());
-    mask_.emplace(mask_info(info.picture), engine_.band().rows(), writes());
+      wishes_.absorb_frames =
+          static_cast<int64_t>(std::clamp(std::round(options_.absorb_time * info.rate), 1.0, 1e12));
+    wishes_.masks_expected = wants_masks();
+    picture_.emplace(info.picture, band().rows(), writes());
+    mask_.emplace(mask_info(info.picture), band().rows(), writes());
     outputs_.emplace(options_.wanted, info.picture, info.rate, options_.encoder);
     if (!writes()) return;
     // Nobody goes on with what another job had done.
@@ -201,7 +202,7 @@ class Job {
         line_.begin(reader_.share());
       }
       const auto start = Clock::now();
-      check(engine_.push(reader_.view()));
+      check(engine_.push(reader_.view(), &wishes_));
       pushing_ += since(start);
       times.push_back(reader_.time());
       line_.show(reader_.share(), read, done_.windows + 1);
@@ -235,7 +236,7 @@ class Job {
     const bool known = read <= done_.frames;
     for (GstClockTime time : *times) {
       if (!known) write_frame(time);
-      engine_.skip();
+      engine_.next()->skip();
     }
     if (!known) {
       write_background();
@@ -252,7 +253,7 @@ class Job {
   }
 
   void note_solve() {
-    const SolveReport report = engine_.report();
+    const SolveReport report = engine_.report().solve;
     solves_.push_back({{"frames", report.window_frames},
                        {"rank", report.dmd.rank},
                        {"lambda", {report.dmd.lambda.real(), report.dmd.lambda.imag()}},
@@ -267,7 +268,7 @@ class Job {
       if (wanted.is_picture()) continue;
       if (wanted.output == Output::mask && options_.shadows != Shadows::marked) {
         const auto start = Clock::now();
-        const uint8_t* const mask = engine_.whole_mask();
+        const uint8_t* const mask = engine_.next()->whole_mask();
         if (writes()) mask_->whole->copy(mask);
         pictures_ += since(start);
         if (writes()) encode(which, mask_->whole->all(), time);
@@ -276,7 +277,8 @@ class Job {
       const bool is_mask = wanted.output == Output::mask;
       Shared& shared = is_mask ? *mask_ : *picture_;
       const auto start = Clock::now();
-      engine_.write(wanted.output, is_mask ? Levels() : engine_options_.levels, shared.kept.view());
+      engine_.next()->write(wanted.output, is_mask ? Levels() : engine_options_.levels,
+                            shared.kept.view());
       pictures_ += since(start);
       gather(&shared);
       if (writes()) encode(which, shared.whole->all(), time);
@@ -314,7 +316,7 @@ class Job {
 
   // Each process has written its own rows.
   void gather(Shared* shared) {
-    const Band& band = engine_.band();
+    const Band& band = this->band();
     const int first = band.own_begin(), end = first + band.own_rows();
     for (int plane = 0; plane < shared->kept.planes(); ++plane) {
       const std::span<const uint8_t> own = shared->kept.rows(plane, first, end);
@@ -381,8 +383,8 @@ class Job {
                                  (team_ ? team_->processor_seconds() : 0));
     add("most-memory", static_cast<double>(usage.ru_maxrss) * 1024);
     add("page-faults", static_cast<double>(usage.ru_minflt));
-    add("rows", engine_.configured() ? engine_.band().own_rows() : 0);
-    add("rows-kept", engine_.configured() ? engine_.band().rows() : 0);
+    add("rows", engine_.configured() ? band().own_rows() : 0);
+    add("rows-kept", engine_.configured() ? band().rows() : 0);
     const auto frames = static_cast<double>(std::max<int64_t>(frames_, 1));
     Json bytes;
     for (size_t i = 0; team_ && i < kTraffic; ++i) {
@@ -417,6 +419,7 @@ class Job {
   FrameReader reader_;
   ProgressLine line_;
   Engine engine_;
+  Wishes wishes_;
   std::optional<Outputs> outputs_;
   std::string progress_path_;
   Progress done_;

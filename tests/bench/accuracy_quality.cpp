@@ -131,8 +131,8 @@ void separate(const Setting& setting, const TrueClip& clip, Pictures* keep) {
   cv::Mat picture(size, CV_8UC3);
   size_t popped = 0;
   const auto take = [&] {
-    for (; engine.ready(); ++popped) {
-      engine.pop(Output::background, view_of(picture));
+    for (; engine.next(); ++popped) {
+      engine.next()->pop(Output::background, view_of(picture));
       if (wanted.contains(popped)) keep->emplace(popped, picture.clone());
     }
   };
@@ -201,7 +201,9 @@ Entry entry_of(const TrueClip& clip, const Setting& setting) {
   entry.setting = setting;
   entry.values["layout_mb"] =
       static_cast<double>(
-          layout_of(engine_options(setting, clip.frames.size()), size.width, size.height).bytes) /
+          EnginePlan(engine_options(setting, clip.frames.size()), size.width, size.height)
+              .layout()
+              .bytes) /
       (1 << 20);
   entry.pictures = [&clip, setting] {
     Pictures pictures;

@@ -143,8 +143,8 @@ void add_engine(Sweep* sweep, Method method, int frames, const Size& size) {
       check(engine.push(view(static_cast<const uint8_t*>(frame.data()), ImageView())));
     }
     check(engine.drain());
-    while (engine.ready())
-      engine.pop(Output::background, view(source->picture.data(), MutableImageView()));
+    while (engine.next())
+      engine.next()->pop(Output::background, view(source->picture.data(), MutableImageView()));
   };
   sweep->add("engine", method == Method::robust ? "robust" : "qdmd", "gram", 0, frames, size, work);
 }

@@ -51,7 +51,8 @@ double time_of(const Size& size, int window, Solver solver) {
   const auto run = [&] {
     for (const auto& frame : frames) check(engine.push(view(frame.data(), ImageView())));
     check(engine.drain());
-    while (engine.ready()) engine.pop(Output::mask, view(picture.data(), MutableImageView()));
+    while (engine.next())
+      engine.next()->pop(Output::mask, view(picture.data(), MutableImageView()));
   };
   // A window before touches the memory; the adjoint does not care.
   if (solver != Solver::adjoint) run();

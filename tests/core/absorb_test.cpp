@@ -44,11 +44,12 @@ std::vector<double> white_of(const Clip& clip, const EngineOptions& options, int
   std::vector<double> white;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-  engine.set_absorb_frames(frames);
+  Wishes wishes = first_wishes(options);
+  wishes.absorb_frames = frames;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture picture(kWidth, kHeight);
-      engine.pop(Output::mask, picture.out());
+      engine.next()->pop(Output::mask, picture.out());
       const auto left = 2 * static_cast<int>(white.size() % 80) - 20;
       int hits = 0, pixels = 0;
       for (int y = 22; y < 42; ++y)
@@ -63,7 +64,7 @@ std::vector<double> white_of(const Clip& clip, const EngineOptions& options, int
   for (const auto& frame : clip.frames) {
     PackedPicture picture(kWidth, kHeight);
     picture.fill(frame);
-    EXPECT_TRUE(engine.push(picture.in()).ok());
+    EXPECT_TRUE(engine.push(picture.in(), &wishes).ok());
     take();
   }
   EXPECT_TRUE(engine.drain().ok());
@@ -135,7 +136,8 @@ TEST_P(Absorb, KeepsTheDepthOfFrames) {
   options.depth = 10;
   Engine engine;
   ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-  engine.set_absorb_frames(120);
+  Wishes wishes = first_wishes(options);
+  wishes.absorb_frames = 120;
   std::mt19937 rng(912);
   std::normal_distribution<double> noise(0, 0.4);
   std::vector<uint8_t> bytes(2 * kPixels);
@@ -154,8 +156,8 @@ TEST_P(Absorb, KeepsTheDepthOfFrames) {
   };
   int seen = 0, compared = 0;
   const auto take = [&] {
-    for (; engine.ready(); ++seen) {
-      engine.pop(Output::background, view);
+    for (; engine.next(); ++seen) {
+      engine.next()->pop(Output::background, view);
       constexpr int kSlack = 25;
       const bool absorbed = seen >= kFrom + 120 + kSlack && seen < kUntil;
       const bool uncovered = seen >= kUntil + 20;
@@ -182,7 +184,7 @@ TEST_P(Absorb, KeepsTheDepthOfFrames) {
         bytes[static_cast<size_t>(2 * (y * kWidth + x))] = static_cast<uint8_t>(sample & 255);
         bytes[static_cast<size_t>(2 * (y * kWidth + x) + 1)] = static_cast<uint8_t>(sample >> 8);
       }
-    ASSERT_TRUE(engine.push(in).ok());
+    ASSERT_TRUE(engine.push(in, &wishes).ok());
     take();
   }
   ASSERT_TRUE(engine.drain().ok());

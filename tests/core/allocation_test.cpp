@@ -47,6 +47,7 @@ enum class Alpha { none, constant, varying };
 struct Steady {
   static constexpr int kWidth = 240, kHeight = 160;
   Engine engine;
+  Wishes wishes;
   std::vector<PackedPicture> frames;
   PackedPicture out;
 
@@ -55,9 +56,8 @@ struct Steady {
     EngineOptions soft = options;
     soft.mask_softness = 2;
     EXPECT_TRUE(engine.configure(soft, kWidth, kHeight).ok());
-    IgnoredAreas areas;
-    areas.add({10, 10, 50, 50});
-    engine.set_ignored(areas);
+    wishes = first_wishes(soft);
+    wishes.ignored.add({10, 10, 50, 50});
     for (int k = 0; k < 7; ++k) {
       frames.emplace_back(kWidth, kHeight, out.bytes_per_pixel, out.with_alpha);
       for (uint8_t& byte : frames.back().bytes) byte = static_cast<uint8_t>(rng() >> 9);
@@ -65,9 +65,9 @@ struct Steady {
         for (size_t p = 0; p < out.pixels(); ++p) frames.back().at(3, p) = 200;
     }
   }
-  void push(int t) { engine.push(frames[static_cast<size_t>(t) % frames.size()].in()); }
+  void push(int t) { engine.push(frames[static_cast<size_t>(t) % frames.size()].in(), &wishes); }
   void pop(int t) {
-    while (engine.ready()) engine.pop(static_cast<Output>(t % 4), out.out());
+    while (engine.next(&wishes)) engine.next()->pop(static_cast<Output>(t % 4), out.out());
   }
 };
 
@@ -112,8 +112,8 @@ TEST_F(Allocations, BatchFramesThatCompleteNoWindow) {
       const auto push = [&] { steady.push(t); };
       const int64_t pushed = solves ? allocations_of(push) : unwanted_of(push);
       EXPECT_TRUE(solves || pushed == 0) << pushed << " to push frame " << t;
-      EXPECT_TRUE(steady.engine.ready()) << "one leaves for each that comes";
-      EXPECT_EQ(steady.engine.pending(), kWindow);
+      EXPECT_TRUE(steady.engine.next()) << "one leaves for each that comes";
+      EXPECT_EQ(steady.engine.report().pending, kWindow);
       EXPECT_EQ(unwanted_of([&] { steady.pop(t); }), 0) << "to pop after frame " << t;
     }
   });
@@ -135,11 +135,11 @@ TEST_F(Allocations, LiveFramesThatBeginAndEndNoSolve) {
       allocator::see_only_this_thread(threads > 1);
       int quiet = 0;
       for (int t = 0; t < 30; ++t) {
-        const uint64_t solves = steady.engine.solves();
+        const uint64_t solves = steady.engine.report().solves;
         // The schedule's, and where there is no other thread, all of the solve is done there.
         const bool begins = threads == 1 && method == Method::robust && t % 5 == 2;
         const int64_t pushed = allocations_of([&] { steady.push(t); });
-        const bool solved = begins || steady.engine.solves() > solves;
+        const bool solved = begins || steady.engine.report().solves > solves;
         if (pushed > 0 && !solved) allocator::print_first();
         EXPECT_TRUE(solved || pushed == 0) << pushed << " to push frame " << t;
         quiet += !solved;
@@ -159,7 +159,7 @@ TEST_F(Allocations, FrozenFrames) {
       options.mode = mode;
       Steady steady(options, Alpha::constant, rng);
       for (int t = 0; t < 20; ++t) steady.push(t), steady.pop(t);
-      steady.engine.set_freeze(true);
+      steady.wishes.freeze = true;
       for (int t = 0; t < 10; ++t) steady.push(t), steady.pop(t);
       for (int t = 0; t < 25; ++t) {
         const int64_t count = unwanted_of([&] {
@@ -179,7 +179,6 @@ TEST_F(Allocations, FlushAndDrainOfNothing) {
     EXPECT_EQ(unwanted_of([&] {
                 steady.engine.flush();
                 steady.engine.drain();
-                steady.engine.set_foreground_threshold(30);
               }),
               0);
   }

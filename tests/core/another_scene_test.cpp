@@ -52,9 +52,9 @@ Seen run(const Clip& clip, const EngineOptions& options) {
   Engine engine;
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture picture(kWidth, kHeight);
-      engine.pop(Output::background, picture.out());
+      engine.next()->pop(Output::background, picture.out());
       seen.backgrounds.push_back(picture.planes());
     }
   };
@@ -62,7 +62,7 @@ Seen run(const Clip& clip, const EngineOptions& options) {
     PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     EXPECT_TRUE(engine.push(picture.in()).ok());
-    while (seen.scenes.size() < engine.scenes()) seen.scenes.push_back(static_cast<int>(t));
+    while (seen.scenes.size() < engine.report().scenes) seen.scenes.push_back(static_cast<int>(t));
     take();
   }
   EXPECT_TRUE(engine.drain().ok());

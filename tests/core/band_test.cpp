@@ -103,29 +103,30 @@ struct KeptRows {
 Results run(const Case& c, Team* team) {
   EngineOptions options = c.options;
   options.team = team;
+  options.shadows = c.shadows;
   Results results;
   Engine engine;
   const Status status = engine.configure(options, c.street.width, c.street.height);
   EXPECT_TRUE(status.ok()) << status.message;
   if (!status.ok()) return results;
-  engine.set_absorb_frames(c.absorb);
-  engine.set_ignored(c.ignored);
-  engine.set_shadows(c.shadows);
-  const Band& band = engine.band();
+  Wishes wishes = first_wishes(options);
+  wishes.absorb_frames = c.absorb;
+  wishes.ignored = c.ignored;
+  const Band& band = engine.plan().band();
   PackedPicture out(c.street.width, band.rows());
   uint64_t solves = 0;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       for (Output output : kOutputs) {
-        engine.write(output, {}, out.out());
+        engine.next()->write(output, {}, out.out());
         results.pictures.push_back(rows_of(out, band.own_begin(), band.own_rows()));
       }
-      const uint8_t* const mask = engine.whole_mask();
+      const uint8_t* const mask = engine.next()->whole_mask();
       results.masks.emplace_back(mask, mask + c.street.width * c.street.height);
-      engine.skip();
-      if (engine.solves() == solves) continue;
-      solves = engine.solves();
-      const SolveReport report = engine.report();
+      engine.next()->skip();
+      if (engine.report().solves == solves) continue;
+      solves = engine.report().solves;
+      const SolveReport report = engine.report().solve;
       for (double value :
            {report.dmd.lambda.real(), report.dmd.lambda.imag(), report.dmd.omega,
             report.dmd.residual, report.dmd.condition, report.dmd.rounding_bound,
@@ -297,16 +298,17 @@ TEST(Band, BeginsAnewLikeAnotherStream) {
     PackedPicture out(97, 91);
     for (int t = 0; t < 12; ++t)
       ASSERT_TRUE(
-          engine.push(KeptRows(c.street, 12 * window + t, engine.band(), c.options).view).ok());
+          engine.push(KeptRows(c.street, 12 * window + t, engine.plan().band(), c.options).view)
+              .ok());
     ASSERT_TRUE(engine.drain().ok());
     for (int t = 0; t < 12; ++t) {
       for (size_t k = 0; k < std::size(kOutputs); ++k) {
-        engine.write(kOutputs[k], {}, out.out());
+        engine.next()->write(kOutputs[k], {}, out.out());
         EXPECT_TRUE(out.bytes ==
                     all.pictures[std::size(kOutputs) * static_cast<size_t>(12 * window + t) + k])
             << window << " " << t;
       }
-      engine.skip();
+      engine.next()->skip();
     }
   }
 }
@@ -349,8 +351,11 @@ TEST(Band, OwnRowsCoverThePicture) {
         run_team(size, [&](ThreadTeam* team) {
           EngineOptions options = options_of(Method::robust, 8);
           options.team = team;
+          options.colours = Colours::yuv;
           options.chroma_rows = together;
-          const Band band = band_of(options, 1920, height);
+          const EnginePlan plan(options, 1920, height);
+          EXPECT_TRUE(plan.status().ok()) << plan.status().message;
+          const Band& band = plan.band();
           EXPECT_EQ(band.height(), height);
           for (int y = band.own_first(); y < band.own_end(); ++y) ++owners[static_cast<size_t>(y)];
           EXPECT_GE(band.own_begin(), 0);

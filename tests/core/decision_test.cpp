@@ -386,13 +386,14 @@ std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode,
   options.window_size = 50;
   options.threads = 1;
   Engine engine;
-  engine.set_masks_expected(masks_expected);
   EXPECT_TRUE(engine.configure(options, frames[0].width, frames[0].height).ok());
+  Wishes wishes = first_wishes(options);
+  wishes.masks_expected = masks_expected;
   PackedPicture picture(frames[0].width, frames[0].height, 3, false, 0);
   std::vector<double> shares;
   const auto pop = [&] {
-    while (engine.ready()) {
-      engine.pop(Output::mask, picture.out());
+    while (engine.next()) {
+      engine.next()->pop(Output::mask, picture.out());
       const auto planes = picture.planes();
       const size_t pixels = frames[0].pixels();
       for (size_t i = 0; i < planes.size(); ++i) EXPECT_TRUE(planes[i] == 0 || planes[i] == 255);
@@ -404,7 +405,7 @@ std::vector<double> masks_of(const std::vector<Planes>& frames, Mode mode,
     std::vector<uint8_t> planes;
     for (const auto& level : frame.level) planes.insert(planes.end(), level.begin(), level.end());
     picture.fill(planes);
-    EXPECT_TRUE(engine.push(picture.in()).ok());
+    EXPECT_TRUE(engine.push(picture.in(), &wishes).ok());
     pop();
   }
   EXPECT_TRUE(engine.drain().ok());

@@ -74,8 +74,8 @@ Error error_of(const std::vector<Look>& looks, EngineOptions options, int depth,
   size_t shown = 0;
   double count = 0;
   const auto take = [&] {
-    for (; engine.ready(); ++shown) {
-      engine.pop(Output::background, fit(MutableImageView()));
+    for (; engine.next(); ++shown) {
+      engine.next()->pop(Output::background, fit(MutableImageView()));
       if (shown < first) continue;
       const Look& look = looks[shown];
       // What the frame's border shows may be no part of another frame.

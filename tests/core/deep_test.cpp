@@ -97,13 +97,13 @@ std::vector<Outputs> run(const EngineOptions& options, SampleBits bits, bool pac
   DeepPicture picture(bits, packed);
   std::vector<Outputs> all;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       Outputs outputs;
       for (size_t i = 0; i < 4; ++i) {
-        engine.write(kOutputs[i], options.levels, picture.view<uint8_t>());
+        engine.next()->write(kOutputs[i], options.levels, picture.view<uint8_t>());
         outputs[i] = picture.samples();
       }
-      engine.skip();
+      engine.next()->skip();
       all.push_back(std::move(outputs));
     }
   };
@@ -341,15 +341,15 @@ TEST(DeepMasks, AreDecidedOnWholeSamples) {
         EngineOptions options = options_of(depth, Method::robust, kFrames);
         options.mode = mode;
         options.foreground_threshold = threshold;
+        options.shadows = Shadows::foreground;
         Engine engine;
         ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-        engine.set_shadows(Shadows::foreground);
         DeepPicture in({depth, 0}, true), background({depth, 0}, true), mask({depth, 0}, true);
         size_t popped = 0, differ = 0;
         const auto take = [&] {
-          for (; engine.ready(); engine.skip()) {
-            engine.write(Output::background, options.levels, background.view<uint8_t>());
-            engine.write(Output::mask, options.levels, mask.view<uint8_t>());
+          for (; engine.next(); engine.next()->skip()) {
+            engine.next()->write(Output::background, options.levels, background.view<uint8_t>());
+            engine.next()->write(Output::mask, options.levels, mask.view<uint8_t>());
             const Frame x = frames[popped++], l = background.samples(), seen = mask.samples();
             for (size_t p = 0; p < kPixels; ++p) {
               double squared = 0;
@@ -404,13 +404,13 @@ TEST(DeepMasks, FindWhatHighBitsDoNotShow) {
   }
   ASSERT_TRUE(engine.drain().ok());
   for (int t = 0; t < kLength; ++t) {
-    ASSERT_TRUE(engine.ready());
-    const uint8_t* const mask = engine.whole_mask();
+    ASSERT_TRUE(engine.next());
+    const uint8_t* const mask = engine.next()->whole_mask();
     int wrong = 0;
     for (int y = 0; y < kSide; ++y)
       for (int x = 0; x < kSide; ++x) wrong += (mask[y * kSide + x] != 0) != inside(t, x, y);
     EXPECT_EQ(wrong, 0) << t;
-    engine.skip();
+    engine.next()->skip();
   }
 }
 
@@ -460,8 +460,8 @@ TEST(DeepRamp, IsKnownBetterThan8BitsCanTell) {
         ASSERT_TRUE(engine.push(in).ok());
       }
       ASSERT_TRUE(engine.drain().ok());
-      ASSERT_TRUE(engine.ready());
-      engine.pop(Output::background, view);
+      ASSERT_TRUE(engine.next());
+      engine.next()->pop(Output::background, view);
       const size_t which = depth == 8 ? 0 : 1;
       each([&](const uint8_t* at, double level) {
         const double seen = depth == 8 ? *at : (at[0] | at[1] << 8) / 4.0;
@@ -499,8 +499,8 @@ TEST(DeepEngine, OnePixelAndDarkFramesAreOrdinary) {
         for (auto& channel : out.channel) channel = bytes;
         int popped = 0;
         const auto take = [&] {
-          for (; engine.ready(); ++popped) {
-            engine.pop(Output::background, out);
+          for (; engine.next(); ++popped) {
+            engine.next()->pop(Output::background, out);
             EXPECT_EQ(bytes[0] | bytes[1] << 8, sample) << static_cast<int>(method);
           }
         };
@@ -598,7 +598,7 @@ TEST(DeepSpectrum, IsInLevels) {
         ASSERT_TRUE(engine.push(in).ok());
       }
       ASSERT_TRUE(engine.drain().ok());
-      of_depth[deep] = engine.report();
+      of_depth[deep] = engine.report().solve;
     }
     const auto& a = of_depth[0].dmd.spectrum;
     const auto& b = of_depth[1].dmd.spectrum;

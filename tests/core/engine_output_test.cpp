@@ -18,7 +18,7 @@ struct Outputs {
     foreground = f.run(clip, Output::foreground);
     mask = m.run(clip, Output::mask);
     cutout = c.run(clip, Output::cutout);
-    threshold = m.engine.report().foreground.threshold;
+    threshold = m.engine.report().solve.foreground.threshold;
   }
 };
 
@@ -73,12 +73,12 @@ TEST(EngineOutput, PicturesOfOneFrameShareWhatIsComputed) {
       Strip strip(clip.pixels, options);
       size_t frame = 0;
       const auto take = [&] {
-        for (; strip.engine.ready(); ++frame) {
+        for (; strip.engine.next(); ++frame) {
           for (size_t k = 0; k < 6; ++k) {
             const size_t which = (k + frame) % 4;
             // Packed, in rows with gaps or without, and each channel by itself.
             PackedPicture packed(strip.width, 1, 3 + static_cast<int>(k % 2));
-            strip.engine.write(kOutputs[which], Levels(), packed.out());
+            strip.engine.next()->write(kOutputs[which], Levels(), packed.out());
             ASSERT_EQ((*expected[which])[frame], packed.planes()) << which << " of " << frame;
             std::vector<uint8_t> planes(3 * clip.pixels);
             MutableImageView view;
@@ -87,10 +87,10 @@ TEST(EngineOutput, PicturesOfOneFrameShareWhatIsComputed) {
             view.pixel_stride = 1;
             view.row_stride = strip.width;
             for (size_t c = 0; c < 3; ++c) view.channel[c] = planes.data() + c * clip.pixels;
-            strip.engine.write(kOutputs[which], Levels(), view);
+            strip.engine.next()->write(kOutputs[which], Levels(), view);
             ASSERT_EQ((*expected[which])[frame], planes) << which << " of " << frame;
           }
-          strip.engine.skip();
+          strip.engine.next()->skip();
         }
       };
       for (const auto& picture : clip.frames) {
@@ -115,22 +115,24 @@ TEST(EngineOutput, ThresholdTakesEffectAtOnce) {
     const auto mask = strip.pop(Output::mask);
     return std::count(mask.begin(), mask.end(), uint8_t{255});
   };
-  const double automatic = strip.engine.report().foreground.threshold;
+  const double automatic = strip.engine.report().solve.foreground.threshold;
   const auto by_noise = white();
-  strip.engine.set_foreground_threshold(500);
-  EXPECT_EQ(strip.engine.report().foreground.threshold, 500);
+  strip.wishes.foreground_threshold = 500;
+  ASSERT_TRUE(strip.engine.next(&strip.wishes));
+  EXPECT_EQ(strip.engine.report().solve.foreground.threshold, 500);
   EXPECT_EQ(white(), 0) << "no distance is above 442";
-  strip.engine.set_foreground_threshold(0.5);
+  strip.wishes.foreground_threshold = 0.5;
   const auto all = white();
   EXPECT_GT(all, by_noise);
-  strip.engine.set_foreground_threshold(0);
-  EXPECT_EQ(strip.engine.report().foreground.threshold, automatic);
+  strip.wishes.foreground_threshold = 0;
+  ASSERT_TRUE(strip.engine.next(&strip.wishes));
+  EXPECT_EQ(strip.engine.report().solve.foreground.threshold, automatic);
   EXPECT_LT(white(), all);
-  strip.engine.set_foreground_threshold(500);
+  strip.wishes.foreground_threshold = 500;
   strip.pop_all(Output::mask);
   for (const auto& frame : clip.frames) strip.push(frame);
   EXPECT_EQ(white(), 0) << "and stays for the next window";
-  EXPECT_FALSE(strip.engine.ready());
+  EXPECT_FALSE(strip.engine.next());
   strip.engine.drain();
   for (size_t t = 1; t < clip.size(); ++t) EXPECT_EQ(white(), 0) << t;
 }
@@ -157,7 +159,7 @@ TEST(EngineLayout, PaddingIsNeitherReadNorWritten) {
     for (auto [bytes_per_pixel, with_alpha, padding] :
          {std::tuple(4, false, 12), std::tuple(3, false, 3), std::tuple(4, true, 5)}) {
       PackedPicture out(width, height, bytes_per_pixel, with_alpha, padding);
-      engine.pop(output, out.out());
+      engine.next()->pop(output, out.out());
       EXPECT_EQ(out.planes(), output == Output::background ? still : std::vector<uint8_t>(105, 0));
       for (int row = 0; row < height; ++row)
         for (ptrdiff_t i = 0; i < out.row_stride; ++i) {
@@ -187,7 +189,7 @@ TEST(EngineLayout, PlanarAndBottomUp) {
   for (int c = 0; c < 3; ++c) flipped.channel[c] = bytes.data() + 12 * c + 8;
   flipped.width = width, flipped.height = height, flipped.pixel_stride = 1;
   flipped.row_stride = -width;
-  engine.pop(Output::background, flipped);
+  engine.next()->pop(Output::background, flipped);
   for (size_t c = 0; c < 3; ++c)
     for (size_t p = 0; p < 12; ++p)
       EXPECT_EQ(bytes[12 * c + (2 - p / 4) * 4 + p % 4], still[12 * c + p]);
@@ -206,9 +208,9 @@ TEST(EngineAlpha, PassesThroughWithItsOwnFrame) {
     ASSERT_TRUE(engine.configure(window_of(3), width, height).ok());
     int popped = 0;
     const auto take = [&] {
-      while (engine.ready()) {
+      while (engine.next()) {
         PackedPicture out(width, height, 4, true, 2);
-        engine.pop(output, out.out());
+        engine.next()->pop(output, out.out());
         for (size_t p = 0; p < out.pixels(); ++p)
           ASSERT_EQ(out.at(3, p), alpha_of(popped, p, popped % 2 == 1)) << popped;
         ++popped;
@@ -243,14 +245,14 @@ TEST(EngineAlpha, PaddingIsOpaque) {
     PackedPicture out(3, 3, 4, true);
     auto view = out.out();
     view.alpha_is_padding = true;
-    ASSERT_TRUE(engine.ready());
-    engine.pop(output, view);
+    ASSERT_TRUE(engine.next());
+    engine.next()->pop(output, view);
     for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
     if (output == Output::cutout) continue;
     // A frame without alpha is opaque in an output that has it.
     ASSERT_TRUE(engine.drain().ok());
     out = PackedPicture(3, 3, 4, true);
-    engine.pop(output, out.out());
+    engine.next()->pop(output, out.out());
     for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
   }
 }
@@ -266,9 +268,9 @@ TEST(EngineAlpha, OfAnEarlierFrameInTheSlotIsForgotten) {
   // A window of each: the frames leave in the order in which they came.
   int popped = 0;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture out(3, 3, 4, true);
-      engine.pop(Output::background, out.out());
+      engine.next()->pop(Output::background, out.out());
       for (size_t p = 0; p < 9; ++p)
         EXPECT_EQ(out.at(3, p), popped >= 2 ? 255 : alpha_of(0, p, true)) << popped;
       ++popped;
@@ -294,7 +296,7 @@ TEST(EngineAlpha, InputPaddingIsNotTakenForAlpha) {
   engine.push(in);
   engine.push(in);
   PackedPicture out(3, 3, 4, true);
-  engine.pop(Output::background, out.out());
+  engine.next()->pop(Output::background, out.out());
   for (size_t p = 0; p < 9; ++p) EXPECT_EQ(out.at(3, p), 255);
 }
 
@@ -318,9 +320,9 @@ TEST(EngineAlpha, CutoutIsTransparentOutsideTheMask) {
     }
     ASSERT_TRUE(engine.drain().ok());
     for (size_t t = 0; t < count; ++t) {
-      ASSERT_TRUE(engine.ready());
+      ASSERT_TRUE(engine.next());
       PackedPicture out(static_cast<int>(pixels), 1, 4, true);
-      engine.pop(Output::cutout, out.out());
+      engine.next()->pop(Output::cutout, out.out());
       EXPECT_EQ(out.planes(), reference.cutout[t]);
       for (size_t p = 0; p < pixels; ++p) {
         const auto own = static_cast<uint8_t>(varies ? 20 + p : 77 + t);
@@ -345,9 +347,9 @@ TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
       for (const auto& frame : clip.frames) ASSERT_TRUE(strip.push(frame).ok());
       ASSERT_TRUE(strip.engine.drain().ok());
       for (size_t t = 0; t < clip.size(); ++t) {
-        ASSERT_TRUE(strip.engine.ready());
+        ASSERT_TRUE(strip.engine.next());
         std::vector<uint8_t> mask(clip.pixels), residual(clip.pixels);
-        strip.engine.foreground(mask.data(), residual.data());
+        strip.engine.next()->foreground(mask.data(), residual.data());
         for (size_t p = 0; p < clip.pixels; ++p) {
           double squared = 0;
           for (size_t c = 0; c < 3; ++c)
@@ -356,7 +358,7 @@ TEST(EngineOutput, ForegroundIsThatOfTheNextFrame) {
           ASSERT_EQ(residual[p], static_cast<int>(std::min(255.0, std::sqrt(squared))));
         }
         PackedPicture picture(static_cast<int>(clip.pixels), 1);
-        strip.engine.pop(Output::mask, picture.out());
+        strip.engine.next()->pop(Output::mask, picture.out());
       }
     }
 }
@@ -379,19 +381,19 @@ TEST(EngineOutput, WriteBackgroundIsThatOfTheNewestFrame) {
       ASSERT_TRUE(engine.push(picture.in()).ok());
       // Batch: the window is full now, and its last frame is the newest.
       const bool there = engine.write_background(newest.out());
-      EXPECT_EQ(there, engine.solves() > 0);
-      while (engine.ready()) engine.pop(Output::background, last.out());
+      EXPECT_EQ(there, engine.report().solves > 0);
+      while (engine.next()) engine.next()->pop(Output::background, last.out());
     }
     if (mode == Mode::batch) {
-      ASSERT_EQ(engine.pending(), 11);
+      ASSERT_EQ(engine.report().pending, 11);
       // The frames that wait have this background; asked for before each, it stays.
       EXPECT_NE(newest.planes(), last.planes());
       ASSERT_TRUE(engine.drain().ok());
-      while (engine.ready()) {
+      while (engine.next()) {
         PackedPicture again(width, 1);
         EXPECT_TRUE(engine.write_background(again.out()));
         EXPECT_EQ(newest.planes(), again.planes());
-        engine.pop(Output::background, last.out());
+        engine.next()->pop(Output::background, last.out());
       }
     }
     EXPECT_EQ(newest.planes(), last.planes());
@@ -408,7 +410,7 @@ TEST(EngineOutput, ThreadsChangeNothingWhileFramesCome) {
     options.mode = mode;
     Strip steady(clip.pixels, options), changing(clip.pixels, options);
     for (size_t t = 0; t < clip.size(); ++t) {
-      changing.engine.set_threads(static_cast<int>(t % 5));
+      changing.wishes.threads = static_cast<int>(t % 5);
       ASSERT_TRUE(steady.push(clip.frames[t]).ok());
       ASSERT_TRUE(changing.push(clip.frames[t]).ok());
       ASSERT_EQ(steady.pop_all(Output::background), changing.pop_all(Output::background)) << t;

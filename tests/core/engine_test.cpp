@@ -27,9 +27,10 @@ TEST(Engine, EveryFrameComesOutOnceAndInOrder) {
     Strip strip(clip.pixels, options);
     const auto out = strip.run(clip, Output::cutout);
     ASSERT_EQ(out.size(), count);
-    EXPECT_EQ(strip.engine.pending(), 0);
-    EXPECT_EQ(strip.engine.solves(), (count + 19) / 20);
-    EXPECT_EQ(strip.engine.report().window_frames, std::min<int>(20, static_cast<int>(count)));
+    EXPECT_EQ(strip.engine.report().pending, 0);
+    EXPECT_EQ(strip.engine.report().solves, (count + 19) / 20);
+    EXPECT_EQ(strip.engine.report().solve.window_frames,
+              std::min<int>(20, static_cast<int>(count)));
     for (size_t t = 0; t < count; ++t) {
       size_t shown = 0;
       for (size_t i = 0; i < out[t].size(); ++i)
@@ -50,33 +51,33 @@ TEST(Engine, EveryFrameComesOutOnceAndInOrder) {
 TEST(Engine, PendingAndReadyFollowTheWindow) {
   std::mt19937 rng(112);
   Strip strip(10, window_of(4));
-  EXPECT_EQ(strip.engine.delay(), 3);
+  EXPECT_EQ(strip.engine.report().delay, 3);
   for (int round = 0; round < 3; ++round) {
     for (int t = 0; t < 11; ++t) {
       SCOPED_TRACE(t);
-      EXPECT_FALSE(strip.engine.ready());
-      EXPECT_EQ(strip.engine.pending(), std::min(t, 3));
+      EXPECT_FALSE(strip.engine.next());
+      EXPECT_EQ(strip.engine.report().pending, std::min(t, 3));
       ASSERT_TRUE(strip.push(random_picture(10, rng)).ok());
-      EXPECT_EQ(strip.engine.pending(), std::min(t + 1, 4));
+      EXPECT_EQ(strip.engine.report().pending, std::min(t + 1, 4));
       // From the fourth on, one leaves for each that comes; its window was solved with the last
       // frame of it.
-      ASSERT_EQ(strip.engine.ready(), t >= 3);
+      ASSERT_EQ(strip.engine.next() != nullptr, t >= 3);
       if (t >= 3) strip.pop(Output::background);
-      EXPECT_FALSE(strip.engine.ready());
-      EXPECT_EQ(strip.engine.solves(), static_cast<uint64_t>(3 * round + (t + 1) / 4));
+      EXPECT_FALSE(strip.engine.next());
+      EXPECT_EQ(strip.engine.report().solves, static_cast<uint64_t>(3 * round + (t + 1) / 4));
       // The last frame of a window leaves with the third of the next.
-      EXPECT_EQ(strip.engine.frames_left(), t < 3 ? 0 : 3 - (t - 3) % 4);
+      EXPECT_EQ(strip.engine.report().frames_left, t < 3 ? 0 : 3 - (t - 3) % 4);
     }
     // The window of frames 8 to 10 is not full: it ends with the frames before it.
     ASSERT_TRUE(strip.engine.drain().ok());
     for (int t = 3; t > 0; --t) {
-      EXPECT_TRUE(strip.engine.ready());
-      EXPECT_EQ(strip.engine.pending(), t);
+      EXPECT_TRUE(strip.engine.next());
+      EXPECT_EQ(strip.engine.report().pending, t);
       strip.pop(Output::background);
-      EXPECT_EQ(strip.engine.frames_left(), t - 1);
+      EXPECT_EQ(strip.engine.report().frames_left, t - 1);
     }
-    EXPECT_FALSE(strip.engine.ready());
-    EXPECT_EQ(strip.engine.solves(), static_cast<uint64_t>(3 * round + 3));
+    EXPECT_FALSE(strip.engine.next());
+    EXPECT_EQ(strip.engine.report().solves, static_cast<uint64_t>(3 * round + 3));
   }
 }
 
@@ -86,8 +87,8 @@ TEST(Engine, RemainderIsSolvedOnTheLastWholeWindow) {
   auto options = window_of(10);
   Strip strip(clip.pixels, options), tail(clip.pixels, options);
   const auto out = strip.run(clip, Output::background);
-  EXPECT_EQ(strip.engine.report().window_frames, 10);
-  EXPECT_EQ(strip.engine.solves(), 2u);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 10);
+  EXPECT_EQ(strip.engine.report().solves, 2u);
   // The engine is as one that saw the last ten frames only.
   Clip last(clip.pixels, 0);
   last.frames.assign(clip.frames.begin() + 3, clip.frames.end());
@@ -99,18 +100,18 @@ TEST(Engine, DrainBreaksTime) {
   std::mt19937 rng(114);
   Strip strip(10, window_of(8));
   EXPECT_TRUE(strip.engine.drain().ok());
-  EXPECT_FALSE(strip.engine.ready()) << "nothing to drain";
-  EXPECT_EQ(strip.engine.solves(), 0u);
+  EXPECT_FALSE(strip.engine.next()) << "nothing to drain";
+  EXPECT_EQ(strip.engine.report().solves, 0u);
   const auto first = random_picture(10, rng), second = random_picture(10, rng);
   for (int t = 0; t < 5; ++t) strip.push(first);
   strip.engine.drain();
   EXPECT_EQ(strip.pop_all(Output::background).size(), 5u);
-  EXPECT_EQ(strip.engine.report().window_frames, 5);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 5);
   for (int t = 0; t < 3; ++t) strip.push(second);
   strip.engine.drain();
-  EXPECT_EQ(strip.engine.report().window_frames, 3) << "frames before the drain are gone";
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 3) << "frames before the drain are gone";
   for (const auto& picture : strip.pop_all(Output::background)) EXPECT_EQ(picture, second);
-  EXPECT_FALSE(strip.engine.ready());
+  EXPECT_FALSE(strip.engine.next());
 }
 
 // A window ends with its frames, whether anybody asked for their pictures or not.
@@ -127,19 +128,19 @@ TEST(Engine, FramesThatNobodyLooksAtLeaveLikeOthers) {
           const auto picture = random_picture(10, rng);
           for (Strip* strip : {&looked, &skipped}) {
             ASSERT_TRUE(strip->push(picture).ok());
-            while (strip->engine.ready()) strip->engine.skip();
+            while (strip->engine.next()) strip->engine.next()->skip();
           }
         }
         looked.engine.drain();
         skipped.engine.drain();
         const auto expected = looked.pop_all(Output::background);
         // Every second stream gives its last picture, the others none.
-        while (skipped.engine.pending() > stream % 2) skipped.engine.skip();
+        while (skipped.engine.report().pending > stream % 2) skipped.engine.next()->skip();
         const auto last = skipped.pop_all(Output::background);
         if (stream % 2 == 1) {
           EXPECT_EQ(last.at(0), expected.back());
         }
-        EXPECT_EQ(skipped.engine.solves(), looked.engine.solves());
+        EXPECT_EQ(skipped.engine.report().solves, looked.engine.report().solves);
       }
     }
 }
@@ -149,23 +150,23 @@ TEST(Engine, FlushForgets) {
   Strip strip(30, window_of(6));
   for (int t = 0; t < 5; ++t) strip.push(random_picture(30, rng));
   strip.engine.flush();
-  EXPECT_EQ(strip.engine.pending(), 0);
+  EXPECT_EQ(strip.engine.report().pending, 0);
   const auto still = random_picture(30, rng);
   for (int t = 0; t < 6; ++t) {
-    EXPECT_FALSE(strip.engine.ready());
+    EXPECT_FALSE(strip.engine.next());
     strip.push(still);
   }
-  ASSERT_TRUE(strip.engine.ready());
+  ASSERT_TRUE(strip.engine.next());
   EXPECT_EQ(strip.pop(Output::background), still);
   // With frames ready.
   strip.engine.drain();
-  EXPECT_TRUE(strip.engine.ready());
+  EXPECT_TRUE(strip.engine.next());
   strip.engine.flush();
-  EXPECT_EQ(strip.engine.pending(), 0);
-  EXPECT_FALSE(strip.engine.ready());
+  EXPECT_EQ(strip.engine.report().pending, 0);
+  EXPECT_FALSE(strip.engine.next());
   EXPECT_TRUE(strip.push(still).ok());
   strip.engine.drain();
-  EXPECT_EQ(strip.engine.report().window_frames, 1);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 1);
 }
 
 TEST(Engine, ConfigureStartsAfresh) {
@@ -174,12 +175,12 @@ TEST(Engine, ConfigureStartsAfresh) {
   for (int t = 0; t < 3; ++t) strip.push(random_picture(30, rng));
   ASSERT_TRUE(strip.engine.configure(window_of(2), 5, 1).ok());
   strip.width = 5;
-  EXPECT_FALSE(strip.engine.ready());
-  EXPECT_EQ(strip.engine.solves(), 0u);
-  EXPECT_EQ(strip.engine.report().window_frames, 0);
+  EXPECT_FALSE(strip.engine.next());
+  EXPECT_EQ(strip.engine.report().solves, 0u);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 0);
   const auto still = random_picture(5, rng);
   strip.push(still);
-  EXPECT_FALSE(strip.engine.ready());
+  EXPECT_FALSE(strip.engine.next());
   strip.push(still);
   EXPECT_EQ(strip.pop_all(Output::background), (Pictures{still}));
   strip.engine.drain();
@@ -193,10 +194,12 @@ TEST(EngineStatus, BeforeConfigure) {
   PackedPicture picture(2, 2);
   EXPECT_EQ(engine.push(picture.in()).code, Status::Code::not_configured);
   EXPECT_EQ(engine.drain().code, Status::Code::not_configured);
-  EXPECT_FALSE(engine.ready());
+  EXPECT_FALSE(engine.next());
   engine.flush();
-  engine.pop(Output::background, picture.out());
-  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing to pop, nothing written";
+  EXPECT_FALSE(engine.next());
+  EXPECT_EQ(engine.report().pending, 0);
+  EXPECT_FALSE(engine.write_background(picture.out()));
+  EXPECT_EQ(picture.bytes, PackedPicture(2, 2).bytes) << "nothing is written";
 }
 
 TEST(EngineStatus, PushWhileFramesAreWaiting) {
@@ -208,12 +211,12 @@ TEST(EngineStatus, PushWhileFramesAreWaiting) {
   EXPECT_EQ(status.code, Status::Code::frames_are_waiting);
   EXPECT_FALSE(status.ok());
   EXPECT_FALSE(status.message.empty());
-  EXPECT_EQ(strip.engine.pending(), 3);
+  EXPECT_EQ(strip.engine.report().pending, 3);
   const auto expected = undisturbed.run(clip, Output::background);
   EXPECT_EQ(strip.pop_all(Output::background), (Pictures{expected[0]}));
   strip.engine.drain();
   EXPECT_EQ(strip.push(clip.frames[0]).code, Status::Code::frames_are_waiting) << "drained";
-  EXPECT_EQ(strip.engine.pending(), 2);
+  EXPECT_EQ(strip.engine.report().pending, 2);
   EXPECT_EQ(strip.pop_all(Output::background), (Pictures{expected[1], expected[2]}));
   EXPECT_TRUE(strip.push(clip.frames[0]).ok());
 }
@@ -233,7 +236,7 @@ TEST(EngineStatus, FramesOfAnotherSize) {
   PackedPicture wider(9, 1), higher(8, 2);
   EXPECT_EQ(strip.engine.push(wider.in()).code, Status::Code::invalid_options);
   EXPECT_EQ(strip.engine.push(higher.in()).code, Status::Code::invalid_options);
-  EXPECT_EQ(strip.engine.pending(), 0);
+  EXPECT_EQ(strip.engine.report().pending, 0);
 }
 
 TEST(EngineStatus, RangesOfTheOptions) {
@@ -353,7 +356,7 @@ TEST(EngineBackground, UniformWindowsComeBackExactly) {
             const auto out = strip.run(static_clip(picture, 8), Output::background);
             ASSERT_EQ(out.size(), 8u);
             for (const auto& level : out) ASSERT_EQ(level, picture);
-            EXPECT_EQ(strip.engine.report().foreground.ratio, 0);
+            EXPECT_EQ(strip.engine.report().solve.foreground.ratio, 0);
           }
 }
 
@@ -403,10 +406,10 @@ TEST(EngineBackground, AMovingBoxIsForegroundOnAStillPicture) {
   // The box covers a pixel for 2 or 3 frames of 40, which leaves ghosts of at most
   // (230 - 20) sqrt(3) 3 / 40 = 27 levels nearly everywhere. They count as noise and lift the
   // threshold above themselves; the box is more than 130 sqrt(3) - 27 = 198 levels away.
-  EXPECT_LT(strip.engine.report().foreground.threshold, 198);
+  EXPECT_LT(strip.engine.report().solve.foreground.threshold, 198);
   EXPECT_EQ(wrong, 0u);
   // The box is 5 % of the picture.
-  EXPECT_GE(strip.engine.report().foreground.ratio, 0.04);
+  EXPECT_GE(strip.engine.report().solve.foreground.ratio, 0.04);
 }
 
 }  // namespace

@@ -57,29 +57,39 @@ struct PackedPicture {
   }
 };
 
+// What options and a size come to.
+inline EngineLayout layout_of(const EngineOptions& options, int width, int height) {
+  return EnginePlan(options, width, height).layout();
+}
+inline Status check_options(const EngineOptions& options, int width, int height) {
+  return EnginePlan(options, width, height).status();
+}
+
 // An engine for pictures of width x 1.
 struct Strip {
   int width;
   Engine engine;
+  Wishes wishes;  // of each call
 
-  Strip(size_t pixels, const EngineOptions& options) : width(static_cast<int>(pixels)) {
+  Strip(size_t pixels, const EngineOptions& options)
+      : width(static_cast<int>(pixels)), wishes(first_wishes(options)) {
     const Status status = engine.configure(options, width, 1);
     EXPECT_TRUE(status.ok()) << status.message;
   }
   Status push(const std::vector<uint8_t>& planes) {
     PackedPicture picture(width, 1);
     picture.fill(planes);
-    return engine.push(picture.in());
+    return engine.push(picture.in(), &wishes);
   }
   std::vector<uint8_t> pop(Output output) {
     PackedPicture picture(width, 1);
-    engine.pop(output, picture.out());
+    engine.next(&wishes)->pop(output, picture.out());
     return picture.planes();
   }
   // Pops all that is ready.
   std::vector<std::vector<uint8_t>> pop_all(Output output) {
     std::vector<std::vector<uint8_t>> all;
-    while (engine.ready()) all.push_back(pop(output));
+    while (engine.next()) all.push_back(pop(output));
     return all;
   }
   // The whole stream, drained at its end.

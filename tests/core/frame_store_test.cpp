@@ -214,12 +214,12 @@ TEST(EngineMemory, OfAlphaThatVaries) {
     options.max_memory = most;
     Engine engine;
     ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-    EXPECT_EQ(engine.bytes(), without);
+    EXPECT_EQ(engine.report().bytes, without);
     ASSERT_TRUE(engine.push(constant.in()).ok());
     const Status status = engine.push(varying.in());
     EXPECT_EQ(status.ok(), most == with) << status.message;
     if (status.ok()) {
-      EXPECT_EQ(engine.bytes(), with);
+      EXPECT_EQ(engine.report().bytes, with);
       continue;
     }
     EXPECT_EQ(status.code, Status::Code::too_much_memory);
@@ -227,7 +227,7 @@ TEST(EngineMemory, OfAlphaThatVaries) {
                                     std::to_string(with), std::to_string(most)})
       EXPECT_NE(status.message.find(word), std::string::npos) << word << " in " << status.message;
     // Nothing is left, and it goes on.
-    EXPECT_EQ(engine.pending(), 0);
+    EXPECT_EQ(engine.report().pending, 0);
     EXPECT_TRUE(engine.push(constant.in()).ok());
   }
 }

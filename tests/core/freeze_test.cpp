@@ -34,8 +34,8 @@ TEST(FreezeLive, ThePictureStaysAndNothingIsSolved) {
     Strip strip(200, options);
     std::vector<uint8_t> last;
     for (size_t t = 0; t < 28; ++t) last = push_pop(strip, clip.frames[t]);
-    const uint64_t solves = strip.engine.solves();
-    strip.engine.set_freeze(true);
+    const uint64_t solves = strip.engine.report().solves;
+    strip.wishes.freeze = true;
     std::vector<uint8_t> frozen;
     for (size_t t = 28; t < 50; ++t) {
       const auto picture = push_pop(strip, clip.frames[t]);
@@ -43,13 +43,13 @@ TEST(FreezeLive, ThePictureStaysAndNothingIsSolved) {
       ASSERT_EQ(picture, frozen) << t;
     }
     expect_nearly_equal(frozen, last);
-    EXPECT_EQ(strip.engine.solves(), solves);
+    EXPECT_EQ(strip.engine.report().solves, solves);
     // Other outputs use the same background and the threshold of its solve.
-    const double threshold = strip.engine.report().foreground.threshold;
+    const double threshold = strip.engine.report().solve.foreground.threshold;
     for (Output output : kOutputs)
       EXPECT_EQ(push_pop(strip, clip.frames[50], output),
                 picture_of(clip.frames[50], frozen, output, threshold));
-    EXPECT_EQ(strip.engine.solves(), solves);
+    EXPECT_EQ(strip.engine.report().solves, solves);
   }
 }
 
@@ -59,26 +59,26 @@ TEST(FreezeLive, LearnsAgainFromTheNextFrameOn) {
   const auto options = live_of(10, 4);
   Strip strip(100, options);
   for (size_t t = 0; t < 20; ++t) push_pop(strip, clip.frames[t]);
-  strip.engine.set_freeze(true);
+  strip.wishes.freeze = true;
   std::vector<uint8_t> frozen;
   for (size_t t = 20; t < 27; ++t) frozen = push_pop(strip, clip.frames[t]);
-  strip.engine.set_freeze(false);
-  const uint64_t solves = strip.engine.solves();
+  strip.wishes.freeze = false;
+  const uint64_t solves = strip.engine.report().solves;
   for (size_t t = 27; t < 30; ++t) EXPECT_EQ(push_pop(strip, clip.frames[t]), frozen) << t;
-  EXPECT_EQ(strip.engine.solves(), solves);
+  EXPECT_EQ(strip.engine.report().solves, solves);
   FreshModel model(part_of(clip, 27, 4), options);
   EXPECT_EQ(push_pop(strip, clip.frames[30]), model.background(3));
-  EXPECT_EQ(strip.engine.solves(), solves + 1);
-  EXPECT_EQ(strip.engine.report().window_frames, 4);
+  EXPECT_EQ(strip.engine.report().solves, solves + 1);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 4);
 }
 
 TEST(FreezeLive, BeforeThereIsAModelTheFirstFrameIsIt) {
   std::mt19937 rng(333);
   const Clip clip = random_clip(50, 20, rng);
   Strip strip(50, live_of(6));
-  strip.engine.set_freeze(true);
+  strip.wishes.freeze = true;
   for (const auto& frame : clip.frames) ASSERT_EQ(push_pop(strip, frame), clip.frames[0]);
-  EXPECT_EQ(strip.engine.solves(), 1u);
+  EXPECT_EQ(strip.engine.report().solves, 1u);
   // flush() forgets the model, not the wish.
   strip.engine.flush();
   for (size_t t = 5; t < 20; ++t) ASSERT_EQ(push_pop(strip, clip.frames[t]), clip.frames[5]);
@@ -92,12 +92,12 @@ TEST(FreezeLive, DrainAndFreezeTogether) {
     Strip strip(80, options);
     for (size_t t = 0; t < 15; ++t) push_pop(strip, clip.frames[t]);
     if (drain_first) strip.engine.drain();
-    strip.engine.set_freeze(true);
+    strip.wishes.freeze = true;
     const auto frozen = push_pop(strip, clip.frames[15]);
     strip.engine.drain();
     for (size_t t = 16; t < 20; ++t) EXPECT_EQ(push_pop(strip, clip.frames[t]), frozen);
     strip.engine.drain();
-    strip.engine.set_freeze(false);
+    strip.wishes.freeze = false;
     for (size_t t = 20; t < 22; ++t) EXPECT_EQ(push_pop(strip, clip.frames[t]), frozen);
     FreshModel model(part_of(clip, 20, 3), options);
     EXPECT_EQ(push_pop(strip, clip.frames[22]), model.background(2));
@@ -109,8 +109,8 @@ TEST(FreezeLive, OnAndOffBetweenTwoFramesChangesNothing) {
   const Clip clip = moving_box_clip(80, 30, 20, rng);
   Strip strip(80, live_of(8, 3)), undisturbed(80, live_of(8, 3));
   for (const auto& frame : clip.frames) {
-    strip.engine.set_freeze(true);
-    strip.engine.set_freeze(false);
+    strip.wishes.freeze = true;
+    strip.wishes.freeze = false;
     EXPECT_EQ(push_pop(strip, frame), push_pop(undisturbed, frame));
   }
 }
@@ -120,7 +120,7 @@ TEST(FreezeLive, EveryOtherFrameIsStillOnePictureEach) {
   const Clip clip = moving_box_clip(80, 50, 20, rng);
   Strip strip(80, live_of(8, 2));
   for (size_t t = 0; t < clip.size(); ++t) {
-    strip.engine.set_freeze(t % 2 == 0);
+    strip.wishes.freeze = t % 2 == 0;
     EXPECT_TRUE(strip.push(clip.frames[t]).ok());
     EXPECT_EQ(strip.pop_all(Output::background).size(), 1u);
   }
@@ -144,17 +144,17 @@ TEST(FreezeBatch, FromTheNextWindowOn) {
       const auto learned = undisturbed.run(clip, Output::background);
       Pictures out;
       for (size_t t = 0; t < clip.size(); ++t) {
-        if (t == 10 + asked_at) strip.engine.set_freeze(true);
-        if (t == 34) strip.engine.set_freeze(false);
+        if (t == 10 + asked_at) strip.wishes.freeze = true;
+        if (t == 34) strip.wishes.freeze = false;
         ASSERT_TRUE(strip.push(clip.frames[t]).ok());
         take(&strip, &out);
         ASSERT_EQ(out.size(), t < 9 ? 0 : t - 8);
         // A window's first frame leaves with the window's last: from then on a solve counts.
         if (t == 39 || t == 48) {
-          EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 1u : 2u);
+          EXPECT_EQ(strip.engine.report().solves, asked_at == 0 ? 1u : 2u);
         }
       }
-      EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 2u : 3u);
+      EXPECT_EQ(strip.engine.report().solves, asked_at == 0 ? 2u : 3u);
       strip.engine.drain();
       take(&strip, &out);
       ASSERT_EQ(out.size(), clip.size());
@@ -165,7 +165,7 @@ TEST(FreezeBatch, FromTheNextWindowOn) {
       // Released in the middle of a window: that one is still frozen.
       for (size_t t = begin; t < 40; ++t) ASSERT_EQ(out[t], out[begin]) << t;
       for (size_t t = 40; t < 50; ++t) EXPECT_EQ(out[t], learned[t]) << t;
-      EXPECT_EQ(strip.engine.solves(), asked_at == 0 ? 2u : 3u);
+      EXPECT_EQ(strip.engine.report().solves, asked_at == 0 ? 2u : 3u);
     }
 }
 
@@ -173,13 +173,13 @@ TEST(FreezeBatch, BeforeThereIsAModelOneIsMade) {
   std::mt19937 rng(342);
   const Clip clip = moving_box_clip(100, 24, 20, rng);
   Strip strip(100, window_of(8)), undisturbed(100, window_of(8));
-  strip.engine.set_freeze(true);
+  strip.wishes.freeze = true;
   const auto out = strip.run(clip, Output::background);
   const auto learned = undisturbed.run(clip, Output::background);
   ASSERT_EQ(out.size(), 24u);
   for (size_t t = 0; t < 8; ++t) EXPECT_EQ(out[t], learned[t]);
   for (size_t t = 8; t < 24; ++t) EXPECT_EQ(out[t], out[8]);
-  EXPECT_EQ(strip.engine.solves(), 1u);
+  EXPECT_EQ(strip.engine.report().solves, 1u);
 }
 
 TEST(FreezeBatch, DrainGivesTheRemainderAgainstTheFrozenPicture) {
@@ -190,12 +190,12 @@ TEST(FreezeBatch, DrainGivesTheRemainderAgainstTheFrozenPicture) {
     const auto learned = undisturbed.run(part_of(clip, 0, 8), Output::background);
     Pictures out;
     for (size_t t = 0; t < 8 + rest; ++t) {
-      strip.engine.set_freeze(t >= 8);
+      strip.wishes.freeze = t >= 8;
       ASSERT_TRUE(strip.push(clip.frames[t]).ok());
       take(&strip, &out);
     }
     ASSERT_EQ(out.size(), 1 + rest);
-    EXPECT_EQ(strip.engine.pending(), 7);
+    EXPECT_EQ(strip.engine.report().pending, 7);
     strip.engine.drain();
     take(&strip, &out);
     ASSERT_EQ(out.size(), 8 + rest);
@@ -203,7 +203,7 @@ TEST(FreezeBatch, DrainGivesTheRemainderAgainstTheFrozenPicture) {
     const auto frozen = out[8];
     expect_nearly_equal(frozen, out[7]);
     for (size_t t = 8; t < 8 + rest; ++t) EXPECT_EQ(out[t], frozen) << t;
-    EXPECT_EQ(strip.engine.solves(), 1u);
+    EXPECT_EQ(strip.engine.report().solves, 1u);
     // Time is broken; it is still frozen.
     out.clear();
     for (size_t t = 10; t < 18; ++t) {
@@ -215,9 +215,9 @@ TEST(FreezeBatch, DrainGivesTheRemainderAgainstTheFrozenPicture) {
     take(&strip, &out);
     ASSERT_EQ(out.size(), 8u);
     for (const auto& picture : out) EXPECT_EQ(picture, frozen);
-    EXPECT_EQ(strip.engine.solves(), 1u);
+    EXPECT_EQ(strip.engine.report().solves, 1u);
     // And learns from its own frames alone.
-    strip.engine.set_freeze(false);
+    strip.wishes.freeze = false;
     Strip fresh(100, window_of(8));
     for (size_t t = 4; t < 9; ++t) strip.push(clip.frames[t]), fresh.push(clip.frames[t]);
     strip.engine.drain(), fresh.engine.drain();
@@ -235,7 +235,7 @@ TEST(FreezeBatch, LongWindowsWhoseGroupsRunBeside) {
     const auto learned = undisturbed.run(clip, Output::background);
     Pictures out;
     for (size_t t = 0; t < 160; ++t) {
-      strip.engine.set_freeze(t >= 50 && t < 90);
+      strip.wishes.freeze = t >= 50 && t < 90;
       strip.push(clip.frames[t]);
       take(&strip, &out);
       ASSERT_EQ(out.size(), t < 39 ? 0 : t - 38);
@@ -259,10 +259,10 @@ TEST(FreezeBatch, FlushForgetsTheFrozenPicture) {
   Strip strip(60, window_of(5)), fresh(60, window_of(5));
   for (size_t t = 0; t < 5; ++t) strip.push(random_picture(60, rng));
   strip.pop_all(Output::background);
-  strip.engine.set_freeze(true);
+  strip.wishes.freeze = true;
   strip.push(random_picture(60, rng));
   strip.engine.flush();
-  strip.engine.set_freeze(false);
+  strip.wishes.freeze = false;
   EXPECT_EQ(strip.run(clip, Output::background), fresh.run(clip, Output::background));
 }
 

@@ -110,9 +110,9 @@ std::vector<uint8_t> output_of(std::vector<PackedPicture> frames, const Trial& t
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   std::vector<uint8_t> all;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture out(kWidth, kHeight, 3);
-      engine.pop(trial.output, out.out());
+      engine.next()->pop(trial.output, out.out());
       all.insert(all.end(), out.bytes.begin(), out.bytes.end());
     }
   };

@@ -198,16 +198,17 @@ TEST(Ignored, SaysNothingInStatistics) {
       options.window_size = 40;
       Engine engine;
       ASSERT_TRUE(engine.configure(options, 160, 60).ok());
-      if (ignored) engine.set_ignored(areas_of({screen.area}));
+      Wishes wishes = first_wishes(options);
+      if (ignored) wishes.ignored = areas_of({screen.area});
       PackedPicture picture(160, 60, 3);
       for (const Floor& frame : screen.frames) {
         picture.fill(frame.planes());
-        ASSERT_TRUE(engine.push(picture.in()).ok());
-        while (engine.ready()) engine.pop(Output::mask, picture.out());
+        ASSERT_TRUE(engine.push(picture.in(), &wishes).ok());
+        while (engine.next()) engine.next()->pop(Output::mask, picture.out());
       }
       ASSERT_TRUE(engine.drain().ok());
-      while (engine.ready()) engine.pop(Output::mask, picture.out());
-      const ForegroundStatistics seen = engine.report().foreground;
+      while (engine.next()) engine.next()->pop(Output::mask, picture.out());
+      const ForegroundStatistics seen = engine.report().solve.foreground;
       EXPECT_GT(seen.noise, 1);
       EXPECT_LT(seen.noise, 4);
       if (ignored)
@@ -224,14 +225,15 @@ TEST(Ignored, MayBeAllOfWhatStatisticsLookAt) {
   options.window_size = 12;
   Engine engine;
   ASSERT_TRUE(engine.configure(options, 160, 60).ok());
-  engine.set_ignored(areas_of({{0, 0, 160, 60}}));
+  Wishes wishes = first_wishes(options);
+  wishes.ignored = areas_of({{0, 0, 160, 60}});
   PackedPicture picture(160, 60, 3);
   for (const Floor& frame : screen.frames) {
     picture.fill(frame.planes());
-    ASSERT_TRUE(engine.push(picture.in()).ok());
+    ASSERT_TRUE(engine.push(picture.in(), &wishes).ok());
   }
-  ASSERT_TRUE(engine.ready());
-  const ForegroundStatistics seen = engine.report().foreground;
+  ASSERT_TRUE(engine.next());
+  const ForegroundStatistics seen = engine.report().solve.foreground;
   EXPECT_EQ(seen.ratio, 0);
   EXPECT_EQ(seen.noise, 0);
   EXPECT_EQ(seen.threshold, 18);
@@ -248,12 +250,13 @@ TEST(Ignored, ChangesFromFrameToFrame) {
   PackedPicture picture(160, 120, 3);
   int left = 0;
   const auto pop = [&] {
-    for (; engine.ready(); ++left) {
+    for (; engine.next(); ++left) {
       const bool ignored = left % 2 == 1;
-      engine.set_ignored(ignored ? areas_of({{0, 0, 160, 120}}) : IgnoredAreas());
+      Wishes wishes = first_wishes(options);
+      if (ignored) wishes.ignored = areas_of({{0, 0, 160, 120}});
       std::vector<uint8_t> mask(floor.pixels()), residual(floor.pixels());
-      engine.foreground(mask.data(), residual.data());
-      engine.pop(Output::mask, picture.out());
+      engine.next(&wishes)->foreground(mask.data(), residual.data());
+      engine.next()->pop(Output::mask, picture.out());
       const auto planes = picture.planes();
       ASSERT_TRUE(std::equal(mask.begin(), mask.end(), planes.begin()));
       const auto white = std::count(mask.begin(), mask.end(), uint8_t{255});

@@ -20,7 +20,7 @@ void push(Engine& engine, int t, bool pop = true) {
           p / 40 == static_cast<size_t>(t) % 19 ? 240 : 40 + (7 * p + 11 * c) % 50);
   ASSERT_TRUE(engine.push(picture.in()).ok());
   if (!pop) return;
-  while (engine.ready()) engine.pop(Output::background, picture.out());
+  while (engine.next()) engine.next()->pop(Output::background, picture.out());
 }
 
 struct Case {
@@ -81,13 +81,13 @@ TEST(LearntMemory, WhereThereIsNoneAllIsAsItWas) {
           ASSERT_TRUE(teacher.learnt(&learnt));
           file = pack(learnt);
         },
-        [&] { EXPECT_FALSE(teacher.ready()); });
+        [&] { EXPECT_FALSE(teacher.next()); });
 
     Engine engine;
     ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
     for (int t = 0; t < c.before; ++t) push(engine, t);
     const auto before = saved(engine);
-    const int pending = engine.pending();
+    const int pending = engine.report().pending;
     EXPECT_EQ(c.before < (c.mode == Mode::batch ? 8 : 1), before.empty());
     Learnt learnt;
     until_it_succeeds(
@@ -97,9 +97,9 @@ TEST(LearntMemory, WhereThereIsNoneAllIsAsItWas) {
         },
         [&] {
           ASSERT_EQ(before, saved(engine));
-          ASSERT_EQ(pending, engine.pending());
+          ASSERT_EQ(pending, engine.report().pending);
         });
-    EXPECT_EQ(pending, engine.pending());
+    EXPECT_EQ(pending, engine.report().pending);
     if (pending == 0) {
       EXPECT_EQ(file, saved(engine));
     }

@@ -15,8 +15,10 @@ namespace {
 struct Box {
   int width, height;
   Engine engine;
+  Wishes wishes;  // of each frame that comes
 
-  Box(int width_, int height_, const EngineOptions& options) : width(width_), height(height_) {
+  Box(int width_, int height_, const EngineOptions& options)
+      : width(width_), height(height_), wishes(first_wishes(options)) {
     const Status status = engine.configure(options, width, height);
     EXPECT_TRUE(status.ok()) << status.message;
   }
@@ -24,14 +26,14 @@ struct Box {
                                          Output output = Output::background) {
     PackedPicture picture(width, height);
     picture.fill(planes);
-    EXPECT_TRUE(engine.push(picture.in()).ok());
+    EXPECT_TRUE(engine.push(picture.in(), &wishes).ok());
     return pop(output);
   }
   std::vector<std::vector<uint8_t>> pop(Output output = Output::background) {
     std::vector<std::vector<uint8_t>> all;
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture out(width, height);
-      engine.pop(output, out.out());
+      engine.next()->pop(output, out.out());
       all.push_back(out.planes());
     }
     return all;
@@ -139,9 +141,9 @@ TEST(Learnt, SavedAndLoadedIsTheSameFile) {
       ASSERT_TRUE(second.engine.learn_from(read).ok());
       EXPECT_EQ(pack(learnt), pack(second.learnt()));
       EXPECT_EQ(planes_of(learnt), second.background());
-      EXPECT_EQ(0u, second.engine.solves());
-      EXPECT_EQ(first.engine.report().foreground.threshold,
-                second.engine.report().foreground.threshold);
+      EXPECT_EQ(0u, second.engine.report().solves);
+      EXPECT_EQ(first.engine.report().solve.foreground.threshold,
+                second.engine.report().solve.foreground.threshold);
     }
 }
 
@@ -157,7 +159,7 @@ TEST(Learnt, LiveHasItsBackgroundWithTheFirstFrame) {
     const auto pictures = box.push(scene(20));
     ASSERT_EQ(1u, pictures.size());
     EXPECT_EQ(planes_of(learnt), pictures[0]);
-    EXPECT_EQ(0u, box.engine.solves());
+    EXPECT_EQ(0u, box.engine.report().solves);
     const auto mask = box.push(scene(20), Output::mask)[0];
     EXPECT_EQ(255, mask[static_cast<size_t>(25 * kWidth + 25)]);
     // Q-DMD's picture has traces of who walked.
@@ -165,7 +167,7 @@ TEST(Learnt, LiveHasItsBackgroundWithTheFirstFrame) {
       EXPECT_EQ(0, mask[static_cast<size_t>(25 * kWidth + 45)]);
     }
     for (int t = 0; t < 40; ++t) box.push(walking(t));
-    EXPECT_GT(box.engine.solves(), 0u);
+    EXPECT_GT(box.engine.report().solves, 0u);
     EXPECT_LT(mean_distance(box.background(), empty_scene()), 4);
   }
 }
@@ -221,7 +223,7 @@ TEST(Learnt, BatchIsToldOfIt) {
   const auto with = window(told), without = window(alone);
   ASSERT_EQ(30u, with.size());
   ASSERT_EQ(30u, without.size());
-  EXPECT_EQ(1u, told.engine.solves());
+  EXPECT_EQ(1u, told.engine.report().solves);
   EXPECT_LT(mean_distance(with[5], empty_scene()), 2);
   // What is confirmed weighs more than what one window saw.
   const auto weight = [](Box& box) { return box.learnt().earlier.value().weight.front(); };
@@ -271,7 +273,7 @@ TEST(Learnt, FrozenFromTheStartNothingIsSolved) {
       const auto options = options_of(mode, method);
       const Learnt learnt = learnt_by(options);
       Box box(kWidth, kHeight, options);
-      box.engine.set_freeze(true);
+      box.wishes.freeze = true;
       ASSERT_TRUE(box.engine.learn_from(learnt).ok());
       size_t frames = 0;
       const auto see = [&](const std::vector<std::vector<uint8_t>>& pictures) {
@@ -284,10 +286,10 @@ TEST(Learnt, FrozenFromTheStartNothingIsSolved) {
       ASSERT_TRUE(box.engine.drain().ok());
       see(box.pop());
       EXPECT_EQ(70u, frames);
-      EXPECT_EQ(0u, box.engine.solves());
-      box.engine.set_freeze(false);
+      EXPECT_EQ(0u, box.engine.report().solves);
+      box.wishes.freeze = false;
       for (int t = 0; t < 70; ++t) box.push(walking(t));
-      EXPECT_GT(box.engine.solves(), 0u);
+      EXPECT_GT(box.engine.report().solves, 0u);
     }
 }
 
@@ -305,7 +307,7 @@ TEST(Learnt, WhileABatchIsFrozenTheNextWindowHasIt) {
         std::move(more.begin(), more.end(), std::back_inserter(pictures));
       };
       for (int t = 0; t < 130; ++t) {
-        if (t == 30) box.engine.set_freeze(true);
+        if (t == 30) box.wishes.freeze = true;
         if (t == at) {
           ASSERT_TRUE(box.engine.learn_from(learnt).ok());
         }
@@ -317,7 +319,7 @@ TEST(Learnt, WhileABatchIsFrozenTheNextWindowHasIt) {
       const int from = (at + 29) / 30 * 30;
       for (int t = 30; t < 130; ++t)
         ASSERT_EQ(t >= from, pictures[static_cast<size_t>(t)] == planes_of(learnt)) << t;
-      EXPECT_EQ(1u, box.engine.solves());
+      EXPECT_EQ(1u, box.engine.report().solves);
     }
 }
 
@@ -331,7 +333,7 @@ TEST(Learnt, WhileABatchIsSolvedNoWindowShowsIt) {
     if (t == 44) {
       ASSERT_TRUE(box.engine.learn_from(learnt).ok());
     }
-    if (t == 90) box.engine.set_freeze(true);
+    if (t == 90) box.wishes.freeze = true;
     for (const auto& picture : box.push(walking(t))) ASSERT_NE(planes_of(learnt), picture) << t;
   }
 }
@@ -357,7 +359,7 @@ TEST(Learnt, WhileABatchWaitsEveryFrameLeaves) {
     ASSERT_TRUE(box.engine.drain().ok());
     frames += box.pop().size();
     EXPECT_EQ(75u, frames) << at;
-    EXPECT_EQ(3u, box.engine.solves()) << at;
+    EXPECT_EQ(3u, box.engine.report().solves) << at;
   }
 }
 

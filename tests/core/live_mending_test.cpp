@@ -42,7 +42,7 @@ std::vector<double> red_of(
     PackedPicture picture(kWidth, kHeight), background(kWidth, kHeight);
     picture.fill(frame);
     EXPECT_TRUE(engine.push(picture.in()).ok());
-    engine.pop(Output::background, background.out());
+    engine.next()->pop(Output::background, background.out());
     double sum = 0, pixels = 0;
     for (int y = 130; y < 254; ++y)
       for (int x = 250; x < 374; ++x) {

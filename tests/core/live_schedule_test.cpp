@@ -30,24 +30,20 @@ struct Spread {
         background(Learner::make(options, static_cast<int>(pixels), 1),
                    {&frames, options.window_size, Models::two_of_live, &workers.pool(), &clock}),
         live({&frames, &background, &workers, &pace, &clock}, plan) {}
-  ~Spread() { live.restart(); }
+  ~Spread() { live.flush(); }
 
   // True where a model was published.
   bool push(const std::vector<uint8_t>& frame) {
     PackedPicture picture(static_cast<int>(pixels), 1);
     picture.fill(frame);
     const uint64_t solves = background.solves();
-    Queue queue;
-    EXPECT_TRUE(live.push(picture.in(), false, &queue));
-    EXPECT_EQ(queue.pending, 1);
-    EXPECT_EQ(queue.ready, 1);
+    EXPECT_TRUE(live.push(picture.in()));
+    EXPECT_EQ(live.queue().pending, 1);
+    EXPECT_EQ(live.queue().ready, 1);
     return background.solves() > solves;
   }
   // A break: the next frame begins a new window.
-  void drain() {
-    Queue queue;
-    live.drain(&queue);
-  }
+  void drain() { live.drain(); }
   std::vector<uint8_t> picture() {
     std::vector<uint8_t> out(3 * pixels);
     uint8_t* const rows[3] = {out.data(), out.data() + pixels, out.data() + 2 * pixels};
@@ -229,12 +225,15 @@ struct Large {
     EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
     EXPECT_FALSE(LivePlan(13, 4, Window::bytes(1, kWidth * kHeight)).at_once());
   }
-  const std::vector<uint8_t>& frame(int t, Output output) {
+  void push(int t) {
     std::fill(picture.bytes.begin(), picture.bytes.end(), static_cast<uint8_t>(50 + t % 5));
     std::fill_n(picture.bytes.begin() + 20'000 * t, 60'000, uint8_t{200});
     EXPECT_TRUE(engine.push(picture.in()).ok());
-    EXPECT_TRUE(engine.ready());
-    engine.pop(output, out.out());
+    EXPECT_TRUE(engine.next());
+  }
+  const std::vector<uint8_t>& frame(int t, Output output) {
+    push(t);
+    engine.next()->pop(output, out.out());
     return out.bytes;
   }
 };
@@ -244,21 +243,23 @@ TEST(EngineLargeLive, ThreadsChangeNoByte) {
   for (int t = 0; t < 30; ++t) {
     const Output output = t % 2 ? Output::background : Output::cutout;
     ASSERT_TRUE(one.frame(t, output) == three.frame(t, output)) << t;
-    ASSERT_EQ(one.engine.solves(), three.engine.solves()) << t;
+    ASSERT_EQ(one.engine.report().solves, three.engine.report().solves) << t;
   }
-  EXPECT_GT(one.engine.solves(), 7u);
+  EXPECT_GT(one.engine.report().solves, 7u);
 }
 
 TEST(EngineLargeLive, AThresholdStaysThroughASolveThatIsUnderWay) {
   Large large(2);
+  Wishes wishes = first_wishes(large.options);
   uint64_t solves = 0;
   for (int t = 0; t < 30; ++t) {
-    large.frame(t, Output::mask);
-    EXPECT_EQ(large.engine.report().foreground.threshold, t == 0 ? 18 : 100.0 + t - 1)
-        << "frame " << t << ", " << large.engine.solves() - solves << " new solves";
-    solves = large.engine.solves();
-    large.engine.set_foreground_threshold(100.0 + t);
-    EXPECT_EQ(large.engine.report().foreground.threshold, 100.0 + t);
+    large.push(t);
+    EXPECT_EQ(large.engine.report().solve.foreground.threshold, t == 0 ? 18 : 100.0 + t - 1)
+        << "frame " << t << ", " << large.engine.report().solves - solves << " new solves";
+    solves = large.engine.report().solves;
+    wishes.foreground_threshold = 100.0 + t;
+    large.engine.next(&wishes)->pop(Output::mask, large.out.out());
+    EXPECT_EQ(large.engine.report().solve.foreground.threshold, 100.0 + t);
   }
 }
 

@@ -67,8 +67,8 @@ TEST(EngineLive, ManyModesAreCappedByTheWindow) {
       expect_naive(clip, options);
       Strip strip(clip.pixels, options);
       strip.run(clip, Output::background);
-      EXPECT_LE(strip.engine.report().dmd.background_modes, 24 / 8);
-      EXPECT_GE(strip.engine.report().dmd.background_modes, 1);
+      EXPECT_LE(strip.engine.report().solve.dmd.background_modes, 24 / 8);
+      EXPECT_GE(strip.engine.report().solve.dmd.background_modes, 1);
     }
 }
 
@@ -115,12 +115,12 @@ TEST(EngineLive, PushWhileAFrameIsWaitingIsRefused) {
   const auto frame = random_picture(20, rng);
   EXPECT_TRUE(strip.push(frame).ok());
   EXPECT_EQ(strip.push(frame).code, Status::Code::frames_are_waiting);
-  EXPECT_EQ(strip.engine.pending(), 1);
+  EXPECT_EQ(strip.engine.report().pending, 1);
   EXPECT_EQ(strip.pop(Output::background), frame);
   EXPECT_TRUE(strip.push(frame).ok());
   strip.engine.flush();
-  EXPECT_FALSE(strip.engine.ready());
-  EXPECT_EQ(strip.engine.pending(), 0);
+  EXPECT_FALSE(strip.engine.next());
+  EXPECT_EQ(strip.engine.report().pending, 0);
   EXPECT_TRUE(strip.push(frame).ok()) << "flush drops the frame that waits";
 }
 
@@ -130,7 +130,7 @@ TEST(EngineLive, RunDrainsToNothing) {
     const Clip clip = random_clip(20, count, rng);
     Strip strip(20, live_of(5));
     EXPECT_EQ(strip.run(clip, Output::background).size(), count);
-    EXPECT_FALSE(strip.engine.ready()) << "drain() has nothing to give";
+    EXPECT_FALSE(strip.engine.next()) << "drain() has nothing to give";
   }
 }
 
@@ -154,9 +154,9 @@ TEST(Engine, ThreadsChangeNoByte) {
         ASSERT_TRUE(engine.configure(options, width, height).ok());
         std::vector<std::vector<uint8_t>> all;
         const auto take = [&] {
-          while (engine.ready()) {
+          while (engine.next()) {
             PackedPicture picture(width, height, 3);
-            engine.pop(output, picture.out());
+            engine.next()->pop(output, picture.out());
             all.push_back(picture.bytes);
           }
         };
@@ -194,7 +194,7 @@ TEST(EngineLive, LargePicturesWithAndWithoutGaps) {
             out(kWidth, kHeight, bytes, false, padding);
         in.fill(clip.frames[t]);
         ASSERT_TRUE(engine.push(in.in()).ok());
-        engine.pop(kOutputs[t], out.out());
+        engine.next()->pop(kOutputs[t], out.out());
         const size_t size = std::min<size_t>(t + 1, 3);
         FreshModel model(part_of(clip, t + 1 - size, size), options);
         const auto background = model.background(static_cast<double>(size - 1));
@@ -224,7 +224,7 @@ TEST(EngineLive, AlphaGoesWithItsFrame) {
     for (size_t p = 0; p < in.pixels() && t % 3 > 0; ++p) in.at(3, p) = constant;
     if (t % 3 == 2) in.at(3, in.pixels() - 1) ^= 1;
     ASSERT_TRUE(engine.push(in.in()).ok());
-    engine.pop(kOutputs[t % 4], out.out());
+    engine.next()->pop(kOutputs[t % 4], out.out());
     for (size_t p = 0; p < in.pixels(); ++p) {
       const bool hidden =
           kOutputs[t % 4] == Output::cutout && out.at(3, p) == 0 && out.at(0, p) == 0;
@@ -245,9 +245,9 @@ TEST(EngineLive, DrainKeepsTheBackgroundUntilThereIsANewModel) {
     strip.push(clip.frames[t]);
     last = strip.pop(Output::background);
   }
-  const uint64_t solves = strip.engine.solves();
+  const uint64_t solves = strip.engine.report().solves;
   ASSERT_TRUE(strip.engine.drain().ok());
-  EXPECT_FALSE(strip.engine.ready());
+  EXPECT_FALSE(strip.engine.next());
   // A window of its own, whose first solve comes after a hop.
   FreshModel first(part_of(clip, 23, 4), options);
   std::vector<uint8_t> kept;
@@ -262,8 +262,8 @@ TEST(EngineLive, DrainKeepsTheBackgroundUntilThereIsANewModel) {
       EXPECT_NE(picture, kept);
     }
   }
-  EXPECT_EQ(strip.engine.solves(), solves + 1);
-  EXPECT_EQ(strip.engine.report().window_frames, 4);
+  EXPECT_EQ(strip.engine.report().solves, solves + 1);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 4);
   // The sums of frozen pictures begin without the half: their last bit may round otherwise.
   size_t differ = 0;
   for (size_t i = 0; i < last.size(); ++i) {
@@ -288,7 +288,7 @@ TEST(EngineLive, ManyDrainsNeedNoModel) {
     EXPECT_EQ(picture, first) << t;
     if (t % 3 == 0) strip.engine.drain();
   }
-  EXPECT_EQ(strip.engine.solves(), 1u);
+  EXPECT_EQ(strip.engine.report().solves, 1u);
 }
 
 TEST(EngineLive, FlushForgets) {
@@ -315,8 +315,8 @@ TEST(EngineLive, ConfigureStartsAfresh) {
   }
   const auto options = live_of(6, 2);
   ASSERT_TRUE(strip.engine.configure(options, 50, 1).ok());
-  EXPECT_EQ(strip.engine.solves(), 0u);
-  EXPECT_EQ(strip.engine.report().window_frames, 0);
+  EXPECT_EQ(strip.engine.report().solves, 0u);
+  EXPECT_EQ(strip.engine.report().solve.window_frames, 0);
   strip.width = 50;
   Strip fresh(50, options);
   EXPECT_EQ(strip.run(clip, Output::background), fresh.run(clip, Output::background));

@@ -339,15 +339,16 @@ inline void expect_naive(const Clip& clip, EngineOptions options,
   NaiveLive naive(clip, options);
   for (size_t t = 0; t < clip.size(); ++t) {
     ASSERT_TRUE(strip.push(clip.frames[t]).ok());
-    ASSERT_TRUE(strip.engine.ready());
-    ASSERT_EQ(strip.engine.pending(), 1);
+    ASSERT_TRUE(strip.engine.next());
+    ASSERT_EQ(strip.engine.report().pending, 1);
     ASSERT_EQ(strip.pop(output), naive.next(output)) << "frame " << t;
-    ASSERT_FALSE(strip.engine.ready());
-    ASSERT_EQ(strip.engine.pending(), 0);
-    ASSERT_EQ(strip.engine.solves(), naive.solves());
-    ASSERT_EQ(strip.engine.report().window_frames, naive.newest().window.size());
-    ASSERT_EQ(strip.engine.report().foreground.threshold, naive.newest().foreground.threshold);
-    ASSERT_EQ(strip.engine.report().dmd.lambda, naive.newest().summary.lambda);
+    ASSERT_FALSE(strip.engine.next());
+    ASSERT_EQ(strip.engine.report().pending, 0);
+    ASSERT_EQ(strip.engine.report().solves, naive.solves());
+    ASSERT_EQ(strip.engine.report().solve.window_frames, naive.newest().window.size());
+    ASSERT_EQ(strip.engine.report().solve.foreground.threshold,
+              naive.newest().foreground.threshold);
+    ASSERT_EQ(strip.engine.report().solve.dmd.lambda, naive.newest().summary.lambda);
   }
 }
 

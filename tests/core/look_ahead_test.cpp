@@ -64,12 +64,13 @@ class LookAheadTest : public testing::TestWithParam<bool> {
     Left left;
     Engine engine;
     EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-    engine.set_absorb_frames(absorb_frames);
+    Wishes wishes = first_wishes(options);
+    wishes.absorb_frames = absorb_frames;
     const auto take = [&] {
-      while (engine.ready()) {
+      while (engine.next()) {
         PackedPicture mask(kWidth, kHeight), background(kWidth, kHeight);
-        engine.write(Output::mask, {}, mask.out());
-        engine.pop(Output::background, background.out());
+        engine.next()->write(Output::mask, {}, mask.out());
+        engine.next()->pop(Output::background, background.out());
         double hits = 0, sum = 0, pixels = 0;
         for (int y = 22; y < 42; ++y)
           for (int x = 42; x < 62; ++x) {
@@ -88,8 +89,8 @@ class LookAheadTest : public testing::TestWithParam<bool> {
     for (size_t t = 0; t < clip.size(); ++t) {
       PackedPicture picture(kWidth, kHeight);
       picture.fill(clip.frames[t]);
-      engine.set_freeze(static_cast<int>(t) >= freeze_at);
-      EXPECT_TRUE(engine.push(picture.in()).ok());
+      wishes.freeze = static_cast<int>(t) >= freeze_at;
+      EXPECT_TRUE(engine.push(picture.in(), &wishes).ok());
       take();
     }
     EXPECT_TRUE(engine.drain().ok());

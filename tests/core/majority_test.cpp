@@ -108,13 +108,13 @@ std::vector<std::vector<uint8_t>> pictures(const std::vector<std::vector<uint8_t
   }
   EXPECT_TRUE(engine.drain().ok());
   std::vector<std::vector<uint8_t>> all;
-  while (engine.ready()) {
+  while (engine.next()) {
     if (by_regions) {
       std::vector<uint8_t> mask(picture.pixels()), residual(picture.pixels());
-      engine.foreground(mask.data(), residual.data());
+      engine.next()->foreground(mask.data(), residual.data());
       all.push_back(mask);
     }
-    engine.pop(output, picture.out());
+    engine.next()->pop(output, picture.out());
     if (!by_regions) all.push_back(picture.planes());
   }
   return all;

@@ -143,9 +143,9 @@ double run(const Case& c) {
   see([&] { status = engine.configure(options_of(c), c.width, c.height); });
   EXPECT_TRUE(status.ok()) << status.message;
   const auto pop = [&] {
-    if (!engine.ready()) return;
-    see([&] { engine.foreground(mask.data(), residual.data()); });
-    while (engine.ready()) see([&] { engine.pop(Output::mask, picture.out()); });
+    if (!engine.next()) return;
+    see([&] { engine.next()->foreground(mask.data(), residual.data()); });
+    while (engine.next()) see([&] { engine.next()->pop(Output::mask, picture.out()); });
     see([&] { engine.write_background(picture.out()); });
     if (c.depth > 8) see([&] { engine.write_background(deep_view<uint8_t>(deep, c)); });
   };
@@ -176,7 +176,7 @@ double run(const Case& c) {
   stream((others > 0 ? 3 : 2) * c.window + c.window / 5 + 2, others);
   // A window that is not full looks at most of its frames, beside those that are remembered.
   stream(c.window - 1, 0);
-  const auto promised = static_cast<double>(engine.bytes());
+  const auto promised = static_cast<double>(engine.report().bytes);
   see([&] { engine.close(); });
   return promised;
 }
@@ -308,17 +308,19 @@ TEST(Memory, OfSoftMasksCountsOnceThereAreAny) {
   Case c;
   c.window = 2;
   ASSERT_TRUE(engine.configure(options_of(c), c.width, c.height).ok());
-  const uint64_t before = engine.bytes();
-  engine.set_mask_softness(2);
-  EXPECT_EQ(engine.bytes(), before);
+  const uint64_t before = engine.report().bytes;
   PackedPicture picture(c.width, c.height, 3);
   for (int t = 0; t < 2; ++t) {
     paint(t, Alpha::none, &picture);
     ASSERT_TRUE(engine.push(picture.in()).ok());
   }
   ASSERT_TRUE(engine.drain().ok());
-  engine.pop(Output::mask, picture.out());
-  const uint64_t after = engine.bytes();
+  Wishes wishes;
+  wishes.mask_softness = 2;
+  LeavingFrame* const frame = engine.next(&wishes);
+  EXPECT_EQ(engine.report().bytes, before);
+  frame->pop(Output::mask, picture.out());
+  const uint64_t after = engine.report().bytes;
   EXPECT_EQ(after - before, SoftMask::bytes(c.width, c.height));
   c.softness = 2;
   EXPECT_EQ(layout_of(options_of(c), c.width, c.height).bytes, after);

@@ -112,6 +112,7 @@ class Owner {
     small_ = small;
     EngineOptions options = options_of(case_);
     if (threads > 0) options.threads = threads;
+    wishes_.threads = options.threads;
     const auto& frame = frames().front();
     take(call([&] { return engine_->configure(options, frame.width, frame.height); }));
     waiting_ = 0;
@@ -120,7 +121,7 @@ class Owner {
   void push(bool look = false) {
     const PackedPicture& frame = frames()[static_cast<size_t>(time_++) % frames().size()];
     const ImageView view = const_cast<PackedPicture&>(frame).in();
-    const Status status = call([&] { return engine_->push(view); });
+    const Status status = call([&] { return engine_->push(view, &wishes_); });
     if (status.ok()) ++waiting_;
     take(status);
     pop(look);
@@ -129,12 +130,12 @@ class Owner {
     for (int i = 0; i < count; ++i) push(look && i % 3 == 0);
   }
   void pop(bool look = false) {
-    if (!engine_->ready()) return;
-    if (look) call([&] { engine_->foreground(mask_.data(), residual_.data()); });
+    if (!engine_->next()) return;
+    if (look) call([&] { engine_->next()->foreground(mask_.data(), residual_.data()); });
     PackedPicture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
                       frames()[0].with_alpha);
-    while (engine_->ready()) {
-      call([&] { engine_->pop(case_.output, out.out()); });
+    while (engine_->next()) {
+      call([&] { engine_->next()->pop(case_.output, out.out()); });
       --waiting_;
       if (keep_) pictures.push_back(out.bytes);
     }
@@ -155,30 +156,26 @@ class Owner {
     call([&] { engine_->close(); });
     waiting_ = 0;
   }
-  void set_freeze(bool freeze) {
-    call([&] { engine_->set_freeze(freeze); });
-  }
-  void set_threads(int threads) {
-    call([&] { engine_->set_threads(threads); });
-  }
+  void set_freeze(bool freeze) { wishes_.freeze = freeze; }
+  void set_threads(int threads) { wishes_.threads = threads; }
   // Pictures depend on time from now on, or no longer do.
   void set_time_budget(double seconds) {
     keep_ = seconds == 0;
-    call([&] { engine_->set_time_budget(seconds); });
+    wishes_.time_budget = seconds;
   }
 
   // After all that succeeded, and after a failure.
   void check_pending(bool failed) {
     // What waits is lost with the call that failed.
-    EXPECT_EQ(engine_->pending(), failed ? 0 : waiting_);
+    EXPECT_EQ(engine_->report().pending, failed ? 0 : waiting_);
   }
   // What is ready must be there, too, after a failure.
   void pop_what_is_ready() {
     PackedPicture out(frames()[0].width, frames()[0].height, frames()[0].bytes_per_pixel,
                       frames()[0].with_alpha);
-    for (int most = 2 * kWindow; engine_->ready() && most > 0; --most)
-      call([&] { engine_->pop(case_.output, out.out()); });
-    EXPECT_FALSE(engine_->ready());
+    for (int most = 2 * kWindow; engine_->next() && most > 0; --most)
+      call([&] { engine_->next()->pop(case_.output, out.out()); });
+    EXPECT_FALSE(engine_->next());
   }
 
   std::vector<std::vector<uint8_t>> pictures;
@@ -191,6 +188,7 @@ class Owner {
 
   Case case_;
   Engine* engine_;
+  Wishes wishes_;  // of each frame that comes
   const std::vector<PackedPicture>&frames_, &small_frames_;
   std::vector<uint8_t> mask_, residual_;
   int waiting_ = 0, time_ = 0;
@@ -353,8 +351,8 @@ std::optional<int64_t> run(const Trial& trial, const std::vector<std::vector<uin
       owner.flush();
       owner.set_threads(trial.c.threads);
     }
-    EXPECT_EQ(engine.pending(), 0);
-    EXPECT_FALSE(engine.ready());
+    EXPECT_EQ(engine.report().pending, 0);
+    EXPECT_FALSE(engine.next());
     EXPECT_EQ(pictures_of(owner, trial.c) == right, true) << "other pictures after a failure";
     owner.check_pending(false);
     const allocator::SeenAgain again;

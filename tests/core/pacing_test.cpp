@@ -46,9 +46,10 @@ class Watched {
         layout_(layout_of(options, kPixels, 1)),
         output_(output),
         strip_(kPixels, options) {
-    EXPECT_EQ(strip_.engine.delay(), options.window_size - 1 + layout_.late_frames);
+    EXPECT_EQ(strip_.engine.report().delay, options.window_size - 1 + layout_.late_frames);
   }
   Engine& engine() { return strip_.engine; }
+  Wishes& wishes() { return strip_.wishes; }
   int late_frames() const { return layout_.late_frames; }
   const EngineLayout& layout() const { return layout_; }
 
@@ -56,36 +57,36 @@ class Watched {
     ASSERT_TRUE(strip_.push(frame).ok());
     ++in_;
     // From the frame after the delay on, exactly one.
-    const bool leaves = in_ > strip_.engine.delay();
-    ASSERT_EQ(strip_.engine.ready(), leaves);
-    ASSERT_EQ(strip_.engine.pending(), in_ - out_);
+    const bool leaves = in_ > strip_.engine.report().delay;
+    ASSERT_EQ(strip_.engine.next() != nullptr, leaves);
+    ASSERT_EQ(strip_.engine.report().pending, in_ - out_);
     if (leaves) {
-      EXPECT_EQ(strip_.engine.frames_left(), end_of_window(out_) - out_);
+      EXPECT_EQ(strip_.engine.report().frames_left, end_of_window(out_) - out_);
       pop(in_ + options_.window_size);
     }
-    ASSERT_FALSE(strip_.engine.ready());
-    ASSERT_EQ(strip_.engine.pending(), std::min(in_, strip_.engine.delay()));
+    ASSERT_FALSE(strip_.engine.next());
+    ASSERT_EQ(strip_.engine.report().pending, std::min(in_, strip_.engine.report().delay));
     if (out_ == 0) {
-      EXPECT_EQ(strip_.engine.frames_left(), 0);
+      EXPECT_EQ(strip_.engine.report().frames_left, 0);
     }
   }
   void drain() {
     ASSERT_TRUE(strip_.engine.drain().ok());
-    ASSERT_EQ(strip_.engine.pending(), in_ - out_);
+    ASSERT_EQ(strip_.engine.report().pending, in_ - out_);
     while (out_ < in_) {
-      ASSERT_TRUE(strip_.engine.ready());
+      ASSERT_TRUE(strip_.engine.next());
       pop(in_);
     }
-    EXPECT_FALSE(strip_.engine.ready());
-    EXPECT_EQ(strip_.engine.pending(), 0);
-    EXPECT_EQ(strip_.engine.frames_left(), 0);
+    EXPECT_FALSE(strip_.engine.next());
+    EXPECT_EQ(strip_.engine.report().pending, 0);
+    EXPECT_EQ(strip_.engine.report().frames_left, 0);
     in_ = out_ = 0;
   }
   void flush() {
     strip_.engine.flush();
-    EXPECT_FALSE(strip_.engine.ready());
-    EXPECT_EQ(strip_.engine.pending(), 0);
-    EXPECT_EQ(strip_.engine.frames_left(), 0);
+    EXPECT_FALSE(strip_.engine.next());
+    EXPECT_EQ(strip_.engine.report().pending, 0);
+    EXPECT_EQ(strip_.engine.report().frames_left, 0);
     in_ = out_ = 0;
     pictures.clear();
   }
@@ -100,7 +101,7 @@ class Watched {
   void pop(int end) {
     pictures.push_back(strip_.pop(output_));
     ++out_;
-    EXPECT_EQ(strip_.engine.frames_left(), std::min(end, end_of_window(out_ - 1)) - out_);
+    EXPECT_EQ(strip_.engine.report().frames_left, std::min(end, end_of_window(out_ - 1)) - out_);
   }
 
   EngineOptions options_;
@@ -137,7 +138,7 @@ class Both {
     each([&](Watched& engine) { engine.push(frame); });
   }
   void set_freeze(bool freeze) {
-    each([&](Watched& engine) { engine.engine().set_freeze(freeze); });
+    each([&](Watched& engine) { engine.wishes().freeze = freeze; });
   }
   // After which all can be compared.
   void drain() {
@@ -148,8 +149,8 @@ class Both {
     ASSERT_EQ(at_once.pictures.size(), paced.pictures.size());
     for (size_t t = 0; t < paced.pictures.size(); ++t)
       ASSERT_EQ(at_once.pictures[t], paced.pictures[t]) << "frame " << t;
-    EXPECT_EQ(at_once.engine().solves(), paced.engine().solves());
-    const SolveReport a = at_once.engine().report(), b = paced.engine().report();
+    EXPECT_EQ(at_once.engine().report().solves, paced.engine().report().solves);
+    const SolveReport a = at_once.engine().report().solve, b = paced.engine().report().solve;
     EXPECT_EQ(a.window_frames, b.window_frames);
     EXPECT_EQ(a.foreground.threshold, b.foreground.threshold);
     EXPECT_EQ(a.foreground.ratio, b.foreground.ratio);
@@ -271,14 +272,14 @@ TEST(Pacing, AFlushAtAnyFrameForgetsEverything) {
       Watched engine(Both::late(kind, threads), Output::background);
       for (size_t before = 0; before <= 2 * window + 3; ++before) {
         SCOPED_TRACE(std::to_string(before) + " frames before");
-        engine.engine().set_freeze(before % 3 == 1);
+        engine.wishes().freeze = before % 3 == 1;
         for (size_t t = 0; t < before; ++t) engine.push(clip.frames[79 - t]);
         // Also with frames that are ready.
         if (drained) {
           ASSERT_TRUE(engine.engine().drain().ok());
         }
         engine.flush();
-        engine.engine().set_freeze(false);
+        engine.wishes().freeze = false;
         for (size_t t = 0; t < 2 * window + 1; ++t) engine.push(clip.frames[t]);
         engine.drain();
         ASSERT_EQ(engine.pictures, fresh.pictures);
@@ -324,7 +325,7 @@ TEST(Pacing, LittleMemoryTakesFromTheFramesOfASolve) {
   options.max_memory = least.bytes;
   EXPECT_EQ(layout_of(options, kPixels, 1).late_frames, 0);
   Strip strip(kPixels, options);
-  EXPECT_EQ(strip.engine.delay(), options.window_size - 1);
+  EXPECT_EQ(strip.engine.report().delay, options.window_size - 1);
 }
 
 // Live frames wait for none.
@@ -332,7 +333,7 @@ TEST(Pacing, LiveHasNoDelay) {
   auto options = Both::late(kKinds[0], 1);
   options.mode = Mode::live;
   EXPECT_EQ(layout_of(options, kPixels, 1).delay, 0);
-  EXPECT_EQ(Strip(kPixels, options).engine.delay(), 0);
+  EXPECT_EQ(Strip(kPixels, options).engine.report().delay, 0);
 }
 
 }  // namespace

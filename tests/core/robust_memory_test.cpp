@@ -244,9 +244,9 @@ std::vector<int> solved_frames(const Clip &clip) {
     PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     EXPECT_TRUE(engine.push(picture.in()).ok());
-    engine.pop(Output::background, picture.out());
-    if (engine.solves() > solves) frames.push_back(static_cast<int>(t));
-    solves = engine.solves();
+    engine.next()->pop(Output::background, picture.out());
+    if (engine.report().solves > solves) frames.push_back(static_cast<int>(t));
+    solves = engine.report().solves;
   }
   return frames;
 }

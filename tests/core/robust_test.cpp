@@ -300,9 +300,9 @@ TEST(RobustWindows, AFlushForgets) {
     ASSERT_TRUE(engine.configure(robust_of(40, 1), kWidth, kHeight).ok());
     std::vector<uint8_t> last;
     const auto take = [&] {
-      while (engine.ready()) {
+      while (engine.next()) {
         PackedPicture picture(kWidth, kHeight);
-        engine.pop(Output::background, picture.out());
+        engine.next()->pop(Output::background, picture.out());
         last = picture.planes();
       }
     };
@@ -361,15 +361,15 @@ TEST(RobustEngine, LiveEveryFrameComesOut) {
     PackedPicture picture(kWidth, kHeight);
     picture.fill(clip.frames[t]);
     ASSERT_TRUE(engine.push(picture.in()).ok());
-    ASSERT_TRUE(engine.ready());
-    engine.pop(Output::background, picture.out());
-    ASSERT_FALSE(engine.ready());
+    ASSERT_TRUE(engine.next());
+    engine.next()->pop(Output::background, picture.out());
+    ASSERT_FALSE(engine.next());
     // A window that has been full for a solve.
     if (t >= 80) {
       EXPECT_LT(mean_error(picture.planes(), background()), 1) << t;
     }
   }
-  EXPECT_GT(engine.solves(), 5u);
+  EXPECT_GT(engine.report().solves, 5u);
 }
 
 // ---- Memory ----
@@ -437,9 +437,9 @@ TEST(RobustEngine, HardCasesPass) {
         ASSERT_TRUE(engine.configure(options, pixels / height, height).ok());
         std::vector<std::vector<uint8_t>> pictures;
         const auto take = [&] {
-          while (engine.ready()) {
+          while (engine.next()) {
             PackedPicture picture(pixels / height, height);
-            engine.pop(Output::background, picture.out());
+            engine.next()->pop(Output::background, picture.out());
             pictures.push_back(picture.planes());
           }
         };
@@ -451,7 +451,7 @@ TEST(RobustEngine, HardCasesPass) {
         }
         ASSERT_TRUE(engine.drain().ok());
         take();
-        const SolveReport& report = engine.report();
+        const SolveReport& report = engine.report().solve;
         EXPECT_TRUE(std::isfinite(report.dmd.lambda.real()));
         EXPECT_TRUE(std::isfinite(report.dmd.lambda.imag()));
         EXPECT_TRUE(std::isfinite(report.dmd.residual));

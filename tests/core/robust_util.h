@@ -48,9 +48,9 @@ inline std::vector<std::vector<uint8_t>> run_engine(const Clip& clip, int width,
   const Status status = engine.configure(options, width, height);
   EXPECT_TRUE(status.ok()) << status.message;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture picture(width, height);
-      engine.pop(output, picture.out());
+      engine.next()->pop(output, picture.out());
       all.push_back(picture.planes());
     }
   };

@@ -19,9 +19,9 @@ std::vector<std::vector<uint8_t>> run(const Clip& clip, const Size& size,
   EXPECT_TRUE(status.ok()) << status.message;
   std::vector<std::vector<uint8_t>> all;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       PackedPicture picture(size.width, size.height, 3);
-      engine.pop(Output::background, picture.out());
+      engine.next()->pop(Output::background, picture.out());
       all.push_back(picture.planes());
     }
   };
@@ -33,7 +33,7 @@ std::vector<std::vector<uint8_t>> run(const Clip& clip, const Size& size,
   }
   EXPECT_TRUE(engine.drain().ok());
   take();
-  *report = engine.report();
+  *report = engine.report().solve;
   return all;
 }
 
@@ -139,29 +139,30 @@ TEST(SampleStep, DrainFlushAndFreezeKeepSamplesInStep) {
       for (size_t last : {1, 2, 3, 5, 8, 13}) {
         Engine engine;
         ASSERT_TRUE(engine.configure(options, size.width, size.height).ok());
+        Wishes wishes = first_wishes(options);
         PackedPicture picture(size.width, size.height, 3);
         std::vector<std::vector<uint8_t>> out;
         const auto push = [&](size_t t) {
           picture.fill(clip.frames[t]);
-          ASSERT_TRUE(engine.push(picture.in()).ok());
-          for (out.clear(); engine.ready();) {
-            engine.pop(Output::background, picture.out());
+          ASSERT_TRUE(engine.push(picture.in(), &wishes).ok());
+          for (out.clear(); engine.next();) {
+            engine.next()->pop(Output::background, picture.out());
             out.push_back(picture.planes());
           }
         };
         for (size_t t = 0; t < last; ++t) {
-          engine.set_freeze(way == 2 || (way == 3 && t >= 2));
+          wishes.freeze = way == 2 || (way == 3 && t >= 2);
           push(t);
         }
-        engine.set_freeze(false);
+        wishes.freeze = false;
         engine.drain();
-        while (engine.ready()) engine.pop(Output::background, picture.out());
+        while (engine.next()) engine.next()->pop(Output::background, picture.out());
         if (way == 1) engine.flush();
         for (size_t t = last; t < last + 6; ++t) push(t);
         if (mode == Mode::batch) {
           engine.drain();
-          while (engine.ready()) {
-            engine.pop(Output::background, picture.out());
+          while (engine.next()) {
+            engine.next()->pop(Output::background, picture.out());
             out.push_back(picture.planes());
           }
         }
@@ -190,17 +191,18 @@ TEST(SampleStep, SamplesAfterAFreeze) {
     for (size_t length : {1, 2, 7}) {
       Engine engine;
       ASSERT_TRUE(engine.configure(options, size.width, size.height).ok());
+      Wishes wishes = first_wishes(options);
       PackedPicture picture(size.width, size.height, 3);
       for (size_t t = 0; t < begin + length + 4; ++t) {
-        engine.set_freeze(t >= begin && t < begin + length);
+        wishes.freeze = t >= begin && t < begin + length;
         picture.fill(clip.frames[t]);
-        ASSERT_TRUE(engine.push(picture.in()).ok());
-        engine.pop(Output::background, picture.out());
+        ASSERT_TRUE(engine.push(picture.in(), &wishes).ok());
+        engine.next()->pop(Output::background, picture.out());
       }
       const Clip part = part_of(clip, begin + length, 4);
       FreshModel model(part, sampled(part, size.width, size.height, 2), options);
-      EXPECT_EQ(engine.report().window_frames, 4);
-      EXPECT_EQ(engine.report().dmd.lambda, model.summary.lambda)
+      EXPECT_EQ(engine.report().solve.window_frames, 4);
+      EXPECT_EQ(engine.report().solve.dmd.lambda, model.summary.lambda)
           << "frozen for " << length << " frames from " << begin;
       EXPECT_EQ(picture.planes(), model.background(3));
     }

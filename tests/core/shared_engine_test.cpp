@@ -63,23 +63,23 @@ std::vector<std::vector<uint8_t>> run(const EngineOptions& options, const VideoL
   VideoPicture in(layout, scene.width, scene.height, 3, bits);
   std::vector<std::vector<uint8_t>> all;
   const auto pop_all = [&] {
-    for (; engine.ready(); engine.skip())
+    for (; engine.next(); engine.next()->skip())
       for (int more = 0; more < 2; ++more) {
         VideoPicture out(layout, scene.width, scene.height, 1, bits);
-        engine.write(kOutputs[(all.size() + static_cast<size_t>(more)) % 4], options.levels,
-                     out.view<uint8_t>());
+        engine.next()->write(kOutputs[(all.size() + static_cast<size_t>(more)) % 4], options.levels,
+                             out.view<uint8_t>());
         all.push_back(out.bytes());
       }
   };
   for (int t = 0; t < frames; ++t) {
     scene.paint(t, &in);
     EXPECT_TRUE(engine.push(in.view<const uint8_t>()).ok());
-    *moved += !engine.newest_pose().is_rest();
+    *moved += !engine.report().newest_pose.is_rest();
     pop_all();
   }
   EXPECT_TRUE(engine.drain().ok());
   pop_all();
-  EXPECT_EQ(engine.pending(), 0);
+  EXPECT_EQ(engine.report().pending, 0);
   EXPECT_EQ(all.size(), static_cast<size_t>(2 * frames));
   return all;
 }
@@ -219,9 +219,9 @@ TEST(SharedEngine, TakesLessMemory) {
     options.window_size = 100;
     options.depth = depth;
     options.dmd.rank = 1;
-    const auto plain = static_cast<double>(layout_of(options, 1920, 1080).bytes);
+    const auto plain = static_cast<double>(EnginePlan(options, 1920, 1080).layout().bytes);
     options.chroma_columns = options.chroma_rows = 2;
-    const auto shared = static_cast<double>(layout_of(options, 1920, 1080).bytes);
+    const auto shared = static_cast<double>(EnginePlan(options, 1920, 1080).layout().bytes);
     EXPECT_LT(shared, 0.62 * plain) << static_cast<int>(method) << ", " << depth << " bits";
   }
 }
@@ -234,10 +234,10 @@ TEST(SharedEngine, OtherColoursThanYuvAreRefused) {
     options.chroma_rows = rows;
     for (Colours colours : {Colours::rgb, Colours::grey}) {
       options.colours = colours;
-      EXPECT_EQ(Status::Code::invalid_options, check_options(options, 16, 16).code);
+      EXPECT_EQ(Status::Code::invalid_options, EnginePlan(options, 16, 16).status().code);
     }
     options.colours = Colours::yuv;
-    EXPECT_TRUE(check_options(options, 16, 16).ok());
+    EXPECT_TRUE(EnginePlan(options, 16, 16).status().ok());
   }
 }
 

@@ -407,10 +407,10 @@ Shown last_of(const Floor& floor, const Floor& frame, Output output, int softnes
   options.colours = colours;
   // Masks tell what alpha is: theirs are full.
   if (colours == Colours::yuv && output == Output::cutout) options.levels = kVideoLevels;
+  options.mask_softness = softness;
+  options.shadows = shadows;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, floor.width, floor.height).ok());
-  engine.set_mask_softness(softness);
-  engine.set_shadows(shadows);
   PackedPicture picture(floor.width, floor.height, 4, with_alpha);
   Shown out;
   for (int t = 0; t < 20; ++t) {
@@ -419,11 +419,11 @@ Shown last_of(const Floor& floor, const Floor& frame, Output output, int softnes
     EXPECT_TRUE(engine.push(picture.in()).ok());
   }
   EXPECT_TRUE(engine.drain().ok());
-  while (engine.ready()) {
+  while (engine.next()) {
     std::vector<uint8_t> residual(floor.pixels());
     out.hard.resize(floor.pixels());
-    engine.foreground(out.hard.data(), residual.data());
-    engine.pop(output, picture.out());
+    engine.next()->foreground(out.hard.data(), residual.data());
+    engine.next()->pop(output, picture.out());
   }
   out.planes = picture.planes();
   for (size_t p = 0; p < picture.pixels(); ++p) out.alpha.push_back(picture.at(3, p));

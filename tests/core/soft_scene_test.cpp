@@ -39,9 +39,9 @@ Change change_of(const std::string& text, int softness) {
   scene::Scene scene(scene_options, text);
   EngineOptions options;
   options.window_size = kWindow;
+  options.mask_softness = softness;
   Engine engine;
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-  engine.set_mask_softness(softness);
   std::vector<std::vector<uint8_t>> labels;
   std::vector<uint8_t> mask(3 * kPixels), before;
   Change change;
@@ -66,9 +66,9 @@ Change change_of(const std::string& text, int softness) {
       }
   };
   const auto pop = [&] {
-    for (; engine.ready(); ++popped) {
+    for (; engine.next(); ++popped) {
       before = mask;
-      engine.pop(Output::mask, view_of(mask.data()));
+      engine.next()->pop(Output::mask, view_of(mask.data()));
       if (popped > 10) compare(labels[popped - 1], labels[popped]);
     }
   };

@@ -51,17 +51,17 @@ struct Result {
   std::vector<std::vector<uint8_t>> pictures;
   std::vector<Pose> poses;  // of the frames as they left
 };
-Result run(const Film& film, const EngineOptions& options, Output output, bool steady = false,
+Result run(const Film& film, EngineOptions options, Output output, bool steady = false,
            int width = kWidth, int height = kHeight) {
   Result result;
   Engine engine;
+  options.stabilize_output = steady;
   EXPECT_TRUE(engine.configure(options, width, height).ok());
-  engine.set_stabilize_output(steady);
   const auto take = [&] {
-    while (engine.ready()) {
-      result.poses.push_back(engine.next_pose());
+    while (engine.next()) {
+      result.poses.push_back(engine.next()->pose());
       auto& picture = result.pictures.emplace_back(film.frames[0].size());
-      engine.pop(output, view_of(picture.data(), width, height));
+      engine.next()->pop(output, view_of(picture.data(), width, height));
     }
   };
   for (const auto& frame : film.frames) {
@@ -218,10 +218,10 @@ TEST(Stabilize, WithoutRoomForSecondCopiesFramesAreTakenAsTheyCome) {
   std::vector<uint8_t> out(shaken.frames[0].size());
   for (const auto& frame : shaken.frames) {
     ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight)).ok());
-    while (engine.ready()) engine.pop(Output::mask, view_of(out.data(), kWidth, kHeight));
+    while (engine.next()) engine.next()->pop(Output::mask, view_of(out.data(), kWidth, kHeight));
   }
-  EXPECT_TRUE(engine.has_no_room_for_motion());
-  EXPECT_LE(engine.bytes(), options.max_memory);
+  EXPECT_TRUE(engine.report().no_room_for_motion);
+  EXPECT_LE(engine.report().bytes, options.max_memory);
 }
 
 TEST(Stabilize, ACameraThatGoesOnIsAnotherScene) {
@@ -234,10 +234,11 @@ TEST(Stabilize, ACameraThatGoesOnIsAnotherScene) {
     std::vector<uint8_t> out(pan.frames[0].size());
     for (const auto& frame : pan.frames) {
       ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight)).ok());
-      while (engine.ready()) engine.pop(Output::background, view_of(out.data(), kWidth, kHeight));
+      while (engine.next())
+        engine.next()->pop(Output::background, view_of(out.data(), kWidth, kHeight));
     }
-    EXPECT_GE(engine.views(), 1u);
-    EXPECT_GE(engine.scenes(), engine.views());
+    EXPECT_GE(engine.report().views, 1u);
+    EXPECT_GE(engine.report().scenes, engine.report().views);
   }
 }
 
@@ -276,16 +277,17 @@ TEST(Stabilize, TakesAnySizeAndAnyFrame) {
 TEST(Stabilize, WhatIsIgnoredStaysWhereItIs) {
   const Film shaken = film("basic,bootstrap,jitter=3", 60);
   Engine engine;
-  ASSERT_TRUE(engine.configure(robust(Stabilize::translation), kWidth, kHeight).ok());
-  IgnoredAreas areas;
+  const EngineOptions options = robust(Stabilize::translation);
+  ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  Wishes wishes = first_wishes(options);
+  IgnoredAreas& areas = wishes.ignored;
   areas.add({40, 50, 60, 50});
-  engine.set_ignored(areas);
   std::vector<uint8_t> out(shaken.frames[0].size());
   int inside = 0, outside = 0;
   for (const auto& frame : shaken.frames) {
-    ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight)).ok());
-    while (engine.ready()) {
-      engine.pop(Output::mask, view_of(out.data(), kWidth, kHeight));
+    ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight), &wishes).ok());
+    while (engine.next()) {
+      engine.next()->pop(Output::mask, view_of(out.data(), kWidth, kHeight));
       for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x)
           if (out[static_cast<size_t>(3 * (y * kWidth + x))] > 0)
@@ -304,12 +306,12 @@ TEST(Stabilize, AfterAFlushTheNextFrameIsTheCanvas) {
   std::vector<uint8_t> out(shaken.frames[0].size());
   for (const auto& frame : shaken.frames) {
     ASSERT_TRUE(engine.push(view_of(frame.data(), kWidth, kHeight)).ok());
-    engine.pop(Output::mask, view_of(out.data(), kWidth, kHeight));
+    engine.next()->pop(Output::mask, view_of(out.data(), kWidth, kHeight));
   }
-  EXPECT_FALSE(engine.newest_pose().is_rest());
+  EXPECT_FALSE(engine.report().newest_pose.is_rest());
   engine.flush();
   ASSERT_TRUE(engine.push(view_of(shaken.frames.back().data(), kWidth, kHeight)).ok());
-  EXPECT_TRUE(engine.newest_pose().is_rest());
+  EXPECT_TRUE(engine.report().newest_pose.is_rest());
 }
 
 }  // namespace

@@ -44,6 +44,7 @@ struct Machine {
       ++stretches;
     }
   }
+  double predicted() const { return budget.predicted(budget.effort()); }
   void slow_down(double factor) {
     for (double* part : {&frame, &once, &samples}) *part *= factor;
   }
@@ -96,7 +97,7 @@ TEST(TimeBudget, WithoutOneEveryStretchHasTheBest) {
   machine.run(50);
   EXPECT_EQ(machine.solves, 50);
   EXPECT_EQ(machine.budget.effort(), kFront[0]);
-  EXPECT_NEAR(machine.budget.predicted(), 0.011, 1e-12);
+  EXPECT_NEAR(machine.predicted(), 0.011, 1e-12);
   // 0.08 + 0.02 / 16 for each solve at step 8.
   EXPECT_NEAR(machine.budget.predicted({2, 8}), 0.001 + 0.08125 / 20, 1e-12);
 }
@@ -143,7 +144,7 @@ TEST(TimeBudget, ThePredictionComesTrue) {
     machine.run(160);
     EXPECT_EQ(machine.budget.effort(), chosen) << allowed;
     // Whole periods of any effort.
-    const double measured = machine.mean_of(480), predicted = machine.budget.predicted();
+    const double measured = machine.mean_of(480), predicted = machine.predicted();
     EXPECT_NEAR(measured, predicted, rounding_of(predicted)) << allowed;
     if (allowed > 0.0016) {
       EXPECT_LE(predicted, allowed);
@@ -254,10 +255,10 @@ TEST(TimeBudget, WhatIsNoNumberIsNoLimit) {
 TEST(TimeBudget, ABreakIsFollowedByASolveAndSpoilsNothing) {
   Machine machine(0.0055);
   machine.run(20);
-  const double predicted = machine.budget.predicted();
+  const double predicted = machine.predicted();
   machine.budget.next();
   machine.budget.add(1, 0.1, {0.1, 0});
-  EXPECT_EQ(machine.budget.predicted(), predicted);
+  EXPECT_EQ(machine.predicted(), predicted);
   machine.budget.solve_next();
   EXPECT_TRUE(machine.budget.next());
 }
@@ -297,7 +298,7 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
 
   struct Outcome {
     uint64_t solves = 0;
-    TimeBudget model;
+    EngineReport report;               // at the end
     std::vector<SolveReport> reports;  // of each solve
     double seconds = 0;                // in all of push() and pop()
     Clock::Spent spent;
@@ -315,7 +316,8 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
     options.threads = 1;
     Engine engine;
     EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
-    engine.set_time_budget(allowed);
+    Wishes wishes = first_wishes(options);
+    wishes.time_budget = allowed;
     std::mt19937 rng(7);
     std::vector<PackedPicture> frames;
     for (int k = 0; k < 12; ++k) {
@@ -333,33 +335,36 @@ class BudgetOfEngine : public testing::TestWithParam<std::tuple<Mode, Method>> {
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
     const auto take = [&] {
-      while (engine.ready()) {
-        timed([&] { engine.pop(Output::background, out.out()); });
+      while (engine.next()) {
+        timed([&] { engine.next()->pop(Output::background, out.out()); });
         outcome.pictures.push_back(out.planes());
       }
     };
     for (int t = 0; t < count; ++t) {
-      timed([&] { EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in()).ok()); });
+      timed([&] {
+        EXPECT_TRUE(engine.push(frames[static_cast<size_t>(t * 5 % 12)].in(), &wishes).ok());
+      });
       take();
-      EXPECT_EQ(engine.pending(), std::min(t + 1, engine.delay()));
+      EXPECT_EQ(engine.report().pending, std::min(t + 1, engine.report().delay));
       engine.clock().charge(Clock::frames, kBeside);
-      if (engine.solves() > outcome.reports.size()) outcome.reports.push_back(engine.report());
+      if (engine.report().solves > outcome.reports.size())
+        outcome.reports.push_back(engine.report().solve);
     }
     timed([&] { EXPECT_TRUE(engine.drain().ok()); });
     take();
-    outcome.solves = engine.solves();
-    outcome.model = engine.time_budget();
+    outcome.solves = engine.report().solves;
+    outcome.report = engine.report();
     outcome.spent = engine.clock().spent();
     return outcome;
   }
 };
 
 TEST_P(BudgetOfEngine, WhatFramesTakeBesideTheEngineCounts) {
-  const TimeBudget model = run(0).model;
-  EXPECT_NEAR(model.predicted(), kBeside, kBesideEngine);
-  EXPECT_EQ(model.effort().period, 1);
+  const EngineReport report = run(0).report;
+  EXPECT_NEAR(report.costs.predicted(report.effort), kBeside, kBesideEngine);
+  EXPECT_EQ(report.effort.period, 1);
   // A frame takes it with a solve and without.
-  EXPECT_NEAR(model.predicted({TimeBudget::kMostPeriod, 1}), kBeside, kBesideEngine);
+  EXPECT_NEAR(report.costs.predicted({TimeBudget::kMostPeriod, 1}), kBeside, kBesideEngine);
 }
 
 // So little that a single frame forbids the next solves.
@@ -371,13 +376,13 @@ TEST_P(BudgetOfEngine, WhereNothingFitsSolvesAreRareAndNoFrameIsLost) {
   const uint64_t stretches = run(0, 1, kCount, Method::qdmd).solves;
   EXPECT_EQ(free.pictures.size(), static_cast<size_t>(kCount));
   EXPECT_EQ(limited.pictures.size(), static_cast<size_t>(kCount)) << "no frame is lost";
-  EXPECT_EQ(limited.model.effort().period, TimeBudget::kMostPeriod);
+  EXPECT_EQ(limited.report.effort.period, TimeBudget::kMostPeriod);
   EXPECT_EQ(limited.solves, 1 + (stretches - 1) / TimeBudget::kMostPeriod);
 }
 
 TEST_P(BudgetOfEngine, WithRoomForEverythingNothingChanges) {
   const Outcome free = run(0), wide = run(2 * kBeside);
-  EXPECT_EQ(wide.model.effort().period, 1);
+  EXPECT_EQ(wide.report.effort.period, 1);
   EXPECT_EQ(free.solves, wide.solves);
   EXPECT_EQ(free.pictures, wide.pictures);
 }
@@ -411,6 +416,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, BudgetOfEngine,
 struct Separator {
   static constexpr int kSide = 64, kSamples = 3 * kSide * kSide;
   Engine engine;
+  Wishes wishes;
   PackedPicture frame{kSide, kSide}, out{kSide, kSide};
 
   Separator(Mode mode, int window, int hop = 0, int threads = 1) {
@@ -420,6 +426,7 @@ struct Separator {
     options.hop_size = hop;
     options.threads = threads;
     EXPECT_TRUE(engine.configure(options, kSide, kSide).ok());
+    wishes = first_wishes(options);
   }
   static double level(int sample, double light) { return (80 + sample % 97) * light; }
   void push(double light) {
@@ -427,11 +434,11 @@ struct Separator {
     for (int i = 0; i < kSamples; ++i)
       planes.push_back(static_cast<uint8_t>(std::lround(level(i, light))));
     frame.fill(planes);
-    EXPECT_TRUE(engine.push(frame.in()).ok());
+    EXPECT_TRUE(engine.push(frame.in(), &wishes).ok());
   }
   // How far the next background is from the scene in that light, in levels on average.
   double pop(double light) {
-    engine.pop(Output::background, out.out());
+    engine.next()->pop(Output::background, out.out());
     const std::vector<uint8_t> seen = out.planes();
     double sum = 0;
     for (int i = 0; i < kSamples; ++i)
@@ -449,9 +456,9 @@ TEST(BudgetOfLive, KnowsWhatFramesTakeWithoutSolves) {
       separator.pop(1);
       separator.engine.clock().charge(Clock::frames, kBeside);
     }
-    const TimeBudget& model = separator.engine.time_budget();
+    const CostModel costs = separator.engine.report().costs;
     for (const Effort& effort : {Effort{1, 1}, Effort{TimeBudget::kMostPeriod, 1}})
-      EXPECT_NEAR(model.predicted(effort), kBeside, kBesideEngine);
+      EXPECT_NEAR(costs.predicted(effort), kBeside, kBesideEngine);
   }
 }
 
@@ -462,7 +469,7 @@ TEST(BudgetOfLive, ABackgroundThatIsKeptFollowsTheLight) {
   Separator separator(Mode::live, kWindow);
   for (int t = 0; t < 15 * kWindow; ++t) {
     // From now on a solve is rare.
-    if (t == 3 * kWindow) separator.engine.set_time_budget(1e-9);
+    if (t == 3 * kWindow) separator.wishes.time_budget = 1e-9;
     const double light = 0.6 + 0.4 * std::min(1.0, t / (3.0 * kWindow));
     separator.push(light);
     const double error = separator.pop(light);
@@ -477,10 +484,10 @@ TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
   constexpr int kWindow = 10;
   const auto light = [](int frame) { return std::max(0.6, 1 - 0.04 * frame); };
   Separator separator(Mode::batch, kWindow);
-  separator.engine.set_time_budget(1e-9);
+  separator.wishes.time_budget = 1e-9;
   int popped = 0;
   const auto take = [&] {
-    for (; separator.engine.ready(); ++popped) {
+    for (; separator.engine.next(); ++popped) {
       const double error = separator.pop(light(popped));
       // From there on the light does not change.
       if (popped >= 3 * kWindow) {
@@ -489,7 +496,7 @@ TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
     }
   };
   for (int t = 0; t < 8 * kWindow; ++t) {
-    separator.engine.set_freeze(t >= kWindow && t < 3 * kWindow);
+    separator.wishes.freeze = t >= kWindow && t < 3 * kWindow;
     separator.push(light(t));
     take();
     EXPECT_EQ(popped, std::max(0, t + 2 - kWindow));
@@ -497,7 +504,7 @@ TEST(BudgetOfBatch, AfterFreezeTheFirstWindowIsSolved) {
   EXPECT_TRUE(separator.engine.drain().ok());
   take();
   EXPECT_EQ(popped, 8 * kWindow);
-  EXPECT_EQ(separator.engine.solves(), 2u);
+  EXPECT_EQ(separator.engine.report().solves, 2u);
 }
 
 // A budget that nothing fits leaves the background of the first window; the light is followed all
@@ -506,11 +513,11 @@ TEST(BudgetOfBatch, ABackgroundThatIsKeptFollowsTheLight) {
   constexpr int kWindow = 10;
   const auto light = [](int frame) { return frame < kWindow ? 1 : 1 - frame / 100.0; };
   Separator separator(Mode::batch, kWindow);
-  separator.engine.set_time_budget(1e-9);
+  separator.wishes.time_budget = 1e-9;
   int popped = 0;
   const auto take = [&] {
     // Both roundings, and the gain's.
-    for (; separator.engine.ready(); ++popped)
+    for (; separator.engine.next(); ++popped)
       EXPECT_LE(separator.pop(light(popped)), 1.5) << "frame " << popped;
   };
   for (int t = 0; t < 4 * kWindow; ++t) {
@@ -521,7 +528,7 @@ TEST(BudgetOfBatch, ABackgroundThatIsKeptFollowsTheLight) {
   EXPECT_TRUE(separator.engine.drain().ok());
   take();
   EXPECT_EQ(popped, 4 * kWindow);
-  EXPECT_EQ(separator.engine.solves(), 1u);
+  EXPECT_EQ(separator.engine.report().solves, 1u);
 }
 
 }  // namespace

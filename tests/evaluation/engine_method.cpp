@@ -75,8 +75,8 @@ class EngineMethod : public Method {
     require(engine.configure(engine_options(element.get()), size.width, size.height));
     cv::Mat picture(size, CV_8UC3);
     const auto take = [&] {
-      while (engine.ready()) {
-        engine.pop(output, view_of(picture));
+      while (engine.next()) {
+        engine.next()->pop(output, view_of(picture));
         see(picture);
       }
     };

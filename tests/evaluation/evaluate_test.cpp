@@ -242,9 +242,9 @@ std::vector<cv::Mat> outputs(const std::vector<cv::Mat>& frames, Output output,
   };
   std::vector<cv::Mat> all;
   const auto take = [&] {
-    while (engine.ready()) {
+    while (engine.next()) {
       all.emplace_back(kHeight, kWidth, CV_8UC3);
-      engine.pop(output, view(all.back()));
+      engine.next()->pop(output, view(all.back()));
     }
   };
   for (const auto& frame : frames) {

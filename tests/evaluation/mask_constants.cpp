@@ -84,7 +84,8 @@ void watch(const LabelledClip& clip,
     if (!status.ok()) throw std::runtime_error(status.message);
   };
   must(engine.configure(options, size.width, size.height));
-  engine.set_masks_expected(false);
+  Wishes wishes = first_wishes(options);
+  wishes.masks_expected = false;
   cv::Mat picture(size, CV_8UC3);
   const auto split = [&](const cv::Mat& from, std::vector<uint8_t>(&to)[kChannels]) {
     uint8_t* out[kChannels];
@@ -98,10 +99,10 @@ void watch(const LabelledClip& clip,
   std::vector<Seen> first_window;
   const auto take = [&] {
     Learnt learnt;
-    if (engine.ready() && !engine.learnt(&learnt)) throw std::runtime_error("nothing is learnt");
+    if (engine.next() && !engine.learnt(&learnt)) throw std::runtime_error("nothing is learnt");
     std::vector<Seen> window;
-    while (engine.ready()) {
-      engine.pop(Output::background, view_of(picture));
+    while (engine.next()) {
+      engine.next()->pop(Output::background, view_of(picture));
       Seen seen;
       split(clip.frames[popped++], seen.x);
       split(picture, seen.level);
@@ -114,7 +115,7 @@ void watch(const LabelledClip& clip,
     for (const Seen& seen : window) see(seen, false);
   };
   for (const cv::Mat& frame : clip.frames) {
-    must(engine.push(view_of(frame)));
+    must(engine.push(view_of(frame), &wishes));
     take();
   }
   must(engine.drain());

@@ -33,15 +33,15 @@ void run_engine(const LabelledClip& clip, Mode mode, const DecisionSteps& steps,
   options.stabilize = Stabilize::translation;
   options.mode = mode;
   options.steps = steps;
+  options.shadows = shadows;
   Engine engine;
-  engine.set_shadows(shadows);
   const cv::Size size = clip.frames[0].size();
   if (const Status status = engine.configure(options, size.width, size.height); !status.ok())
     throw std::runtime_error(status.message);
   cv::Mat picture(size, CV_8UC3), mask;
   const auto take = [&] {
-    while (engine.ready()) {
-      engine.pop(Output::mask, view_of(picture));
+    while (engine.next()) {
+      engine.next()->pop(Output::mask, view_of(picture));
       cv::extractChannel(picture, mask, 0);
       see(mask);
     }

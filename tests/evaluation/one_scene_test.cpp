@@ -30,9 +30,10 @@ TEST(OneScene, IsOneInAllSequences) {
       cv::Mat picture(clip.frames[0].size(), CV_8UC3);
       for (const cv::Mat& frame : clip.frames) {
         ASSERT_TRUE(engine.push(view_of(frame)).ok());
-        while (engine.ready()) engine.pop(Output::background, view_of(picture));
+        while (engine.next()) engine.next()->pop(Output::background, view_of(picture));
       }
-      EXPECT_EQ(engine.scenes(), 0u) << sequence.name << (mode == Mode::live ? " live" : " batch");
+      EXPECT_EQ(engine.report().scenes, 0u)
+          << sequence.name << (mode == Mode::live ? " live" : " batch");
     }
   }
   EXPECT_GT(sequences, 0u);

@@ -29,9 +29,9 @@ std::vector<cv::Mat> backgrounds(const LabelledClip& clip, int rank, int sample_
   if (status.ok()) status = engine.drain();
   if (!status.ok()) throw std::runtime_error(status.message);
   std::vector<cv::Mat> result;
-  while (engine.ready()) {
+  while (engine.next()) {
     result.emplace_back(size, CV_8UC3);
-    engine.pop(Output::background, view_of(result.back()));
+    engine.next()->pop(Output::background, view_of(result.back()));
   }
   return result;
 }

@@ -177,14 +177,14 @@ class EngineTrial {
         QDMD_DEMAND(failed_);
         // What waited is gone, and the engine goes on; or it is not configured.
         // Where there was no memory for the sentence of a refusal, all is as it was.
-        if (!kept_ && engine_.pending() != waiting_) waiting_ = 0;
+        if (!kept_ && engine_.report().pending != waiting_) waiting_ = 0;
         kept_ = false;
       }
       if (failing) {
         allocator::fail_no_more();
         allocator::stop();
       }
-      QDMD_DEMAND(engine_.pending() == waiting_);
+      QDMD_DEMAND(engine_.report().pending == waiting_);
     }
     finish();
   }
@@ -195,9 +195,9 @@ class EngineTrial {
     const bool any = bytes_.once_in(16);
     const int width = any ? bytes_.any_int() : bytes_.from(1, 12);
     const int height = any ? bytes_.any_int() : bytes_.from(1, 12);
-    // Such sizes are for check_options() alone: memory would be there for some of them.
+    // Such sizes are for EnginePlan alone: memory would be there for some of them.
     if (any && int64_t{width} * height > 4096) {
-      const Status status = check_options(options, width, height);
+      const Status status = EnginePlan(options, width, height).status();
       QDMD_DEMAND(status.ok() || !status.message.empty());
       return;
     }
@@ -213,26 +213,27 @@ class EngineTrial {
     const int other = bytes_.below(4);
     frame_ = std::make_unique<Frame>(width, height,
                                      shared && !bytes_.once_in(8) ? Frame::kShared : other);
-    QDMD_DEMAND(engine_.delay() >= 0);
+    QDMD_DEMAND(engine_.report().delay >= 0);
   }
   void push() {
     if (!frame_) return;
     paint(&bytes_, time_++, &frame_->bytes());
-    const bool ready = engine_.ready();
-    const Status status = engine_.push(frame_->view<const uint8_t>());
+    const bool ready = engine_.next() != nullptr;
+    const Status status = engine_.push(frame_->view<const uint8_t>(), &wishes_);
     QDMD_DEMAND(!ready || !status.ok());
     waiting_ += status.ok();
     // Alpha for which there is no room.
     if (status.code == Status::Code::too_much_memory) waiting_ = 0;
     // Mostly one leaves for each that comes.
     if (bytes_.once_in(16)) return;
-    while (engine_.ready()) pop();
+    while (engine_.next()) pop();
   }
   void pop() {
-    if (!engine_.ready()) return;
+    LeavingFrame* const frame = engine_.next(&wishes_);
+    if (!frame) return;
     Frame out(width_, height_, bytes_.below(2));
     for (int pictures = bytes_.below(3); pictures > 0; --pictures)
-      engine_.write(static_cast<Output>(bytes_.below(4)), Levels(), out.view<uint8_t>());
+      frame->write(static_cast<Output>(bytes_.below(4)), Levels(), out.view<uint8_t>());
     if (bytes_.once_in(8)) {
       const auto pixels = static_cast<size_t>(width_ * height_);
       // In one, whose halves they are.
@@ -241,9 +242,9 @@ class EngineTrial {
         const allocator::Unseen unseen;
         both.resize(2 * pixels);
       }
-      engine_.foreground(both.data(), both.data() + pixels);
+      frame->foreground(both.data(), both.data() + pixels);
     }
-    engine_.skip();
+    frame->skip();
     --waiting_;
   }
   void step() {
@@ -262,10 +263,10 @@ class EngineTrial {
         pop();
         break;
       case 4:
-        engine_.set_foreground_threshold(bytes_.byte());
+        wishes_.foreground_threshold = bytes_.byte();
         break;
       case 5:
-        engine_.set_mask_softness(bytes_.below(16));
+        wishes_.mask_softness = bytes_.below(16);
         break;
       case 6: {
         IgnoredAreas areas;
@@ -277,29 +278,29 @@ class EngineTrial {
           area.height = bytes_.any_int();
           areas.add(area);
         }
-        engine_.set_ignored(areas);
+        wishes_.ignored = areas;
         break;
       }
       case 7:
-        engine_.set_masks_expected(bytes_.once_in(2));
+        wishes_.masks_expected = bytes_.once_in(2);
         break;
       case 8:
-        engine_.set_absorb_frames(bytes_.below(20));
+        wishes_.absorb_frames = bytes_.below(20);
         break;
       case 9:
-        engine_.set_shadows(static_cast<Shadows>(bytes_.below(3)));
+        wishes_.shadows = static_cast<Shadows>(bytes_.below(3));
         break;
       case 10:
-        engine_.set_stabilize_output(bytes_.once_in(2));
+        wishes_.stabilize_output = bytes_.once_in(2);
         break;
       case 11:
-        engine_.set_freeze(bytes_.once_in(2));
+        wishes_.freeze = bytes_.once_in(2);
         break;
       case 12:
-        engine_.set_time_budget(bytes_.byte() / 1e5);
+        wishes_.time_budget = bytes_.byte() / 1e5;
         break;
       case 13:
-        engine_.set_threads(bytes_.from(1, 3));
+        wishes_.threads = bytes_.from(1, 3);
         break;
       case 14:
         keep_learnt();
@@ -327,10 +328,8 @@ class EngineTrial {
       default:
         push();
     }
-    check_report(engine_.report());
-    (void)engine_.newest_pose();
-    (void)engine_.next_pose();
-    (void)engine_.bytes();
+    check_report(engine_.report().solve);
+    if (LeavingFrame* const frame = engine_.next()) (void)frame->pose();
   }
   void keep_learnt() {
     // No frame is lost where memory runs out.
@@ -348,18 +347,19 @@ class EngineTrial {
   void finish() {
     if (!engine_.configured()) return;
     try {
-      while (engine_.ready()) pop();
+      while (engine_.next()) pop();
       QDMD_DEMAND(engine_.drain().ok());
-      while (engine_.ready()) pop();
+      while (engine_.next()) pop();
     } catch (const std::bad_alloc&) {
       QDMD_DEMAND(failed_);
       waiting_ = 0;
     }
-    QDMD_DEMAND(waiting_ == 0 && engine_.pending() == 0);
+    QDMD_DEMAND(waiting_ == 0 && engine_.report().pending == 0);
   }
 
   fuzz::Bytes& bytes_;
   Engine engine_;
+  Wishes wishes_;
   Learnt learnt_;
   std::unique_ptr<Frame> frame_;
   int width_ = 0, height_ = 0, waiting_ = 0, time_ = 0;

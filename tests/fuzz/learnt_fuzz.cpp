@@ -77,7 +77,7 @@ void use(Method method, const Learnt& learnt, const Bytes& file) {
   in.row_stride = picture.row_stride = learnt.width;
   for (int t = 0; t < 4; ++t) {
     QDMD_DEMAND(engine.push(in).ok());
-    engine.pop(t % 2 ? Output::mask : Output::background, picture);
+    engine.next()->pop(t % 2 ? Output::mask : Output::background, picture);
   }
 }
 

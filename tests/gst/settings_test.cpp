@@ -1,5 +1,9 @@
 // Properties as they are read and set, the warnings of settings that change nothing or come too
 // late, and stats.
+#include <algorithm>
+#include <fstream>
+#include <string>
+
 #include "tests/gst/element_test.h"
 
 namespace qdmd::test {
@@ -50,6 +54,34 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   }
   g_free(specs);
   gst_object_unref(element);
+}
+
+// ---- The elements' documentation ----
+
+// The first comment of a file in gst/, in one line.
+std::string doc_block_of(const char* file) {
+  std::ifstream in(std::string(QDMD_SOURCE "/gst/") + file);
+  std::string block, line;
+  while (std::getline(in, line) && line != " */") {
+    block.append(line, std::min<size_t>(line.size(), 3));
+    block.push_back(' ');
+  }
+  EXPECT_TRUE(in) << file << " does not begin with a comment";
+  return block;
+}
+
+TEST(Documentation, SaysWhichMethodIsTheDefault) {
+  for (const auto& [name, file] : {std::pair{"qdmdbackground", "gstqdmdbackground.cpp"},
+                                   {"qdmdseparate", "gstqdmdseparate.cpp"}}) {
+    GstElement* element = gst_element_factory_make(name, nullptr);
+    const auto* spec =
+        G_PARAM_SPEC_ENUM(g_object_class_find_property(G_OBJECT_GET_CLASS(element), "method"));
+    const char* nick = g_enum_get_value(spec->enum_class, spec->default_value)->value_nick;
+    std::string said = ":method `";
+    said.append(nick).push_back('`');
+    EXPECT_NE(doc_block_of(file).find(said), std::string::npos) << name << " lacks " << said;
+    gst_object_unref(element);
+  }
 }
 
 // ---- Settings that a method does not look at ----

@@ -9,9 +9,6 @@
 namespace qdmd {
 
 void RobustLearner::mend(const Compared& frame, BackgroundModel* model) {
-  // Somebody may want more of a frame than one picture.
-  if (frame.number <= compared_) return;
-  compared_ = frame.number;
   const int slot = frame.around.slot(frame.at);
   const GridFrames& cells = room_.frames->cells();
   const float* const now[3] = {cells.plane(slot, 0), cells.plane(slot, 1), cells.plane(slot, 2)};

@@ -174,8 +174,8 @@ class RobustLearner : public Learner {
   FrameMemory memory_;
   StandingLooks looks_;  // of the frames that were compared with the background in use
   LookAhead ahead_;      // of those that came
-  int64_t absorb_frames_ = 0, compared_ = -1;  // the frame that was compared last
-  Absorbed absorbed_, absorbed_now_;           // so far, and those that the solve knows of
+  int64_t absorb_frames_ = 0;
+  Absorbed absorbed_, absorbed_now_;  // so far, and those that the solve knows of
   SceneWatch scene_;
   // Solves in a row that changed little, since a cell was mended.
   int calm_ = 0;

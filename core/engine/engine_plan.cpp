@@ -1,7 +1,9 @@
-#include "core/engine/engine_options.h"
+#include "core/engine/engine_plan.h"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/align/restorer.h"
@@ -33,7 +35,7 @@ bool has_too_many_pixels(int width, int height) {
          static_cast<uint64_t>(width) * static_cast<uint64_t>(height) >> 36;
 }
 
-LivePlan plan_for(const EngineOptions& options, const Learner& learner, int width, int height) {
+LivePlan plan_of(const EngineOptions& options, const Learner& learner, int width, int height) {
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   const int piece = learner.in_one_piece()
                         ? LivePlan::piece_frames(pixels, learner.solve_seconds(options.window_size,
@@ -59,75 +61,9 @@ int late_frames_of(const EngineOptions& options, const Learner& learner) {
       std::min<double>(std::ceil(kMargin * frames), (options.window_size + 3) / 4));
 }
 
-EngineLayout layout_with(const EngineOptions& options, const Learner& learner, int width,
-                         int picture_height, int late_frames) {
-  const Band band = band_of(options, width, picture_height);
-  const int height = band.rows();
-  const bool live = options.mode == Mode::live;
-  EngineLayout layout;
-  layout.late_frames = late_frames;
-  layout.delay = live ? 0 : options.window_size - 1 + late_frames;
-  layout.sample_step = learner.sample_steps().front();
-  layout.capacity = options.window_size + late_frames;
-  // They are read until the last of them has left.
-  if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
-  const FrameContents contents = learner.contents();
-  const ChromaShape shape = {width, height, contents.chroma_columns, contents.chroma_rows};
-  const uint64_t digits = options.low_bits() > 0 ? 2 : 1;
-  layout.frame_bytes = digits * PlaneSlots::bytes(layout.capacity, shape);
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, contents);
-  if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
-  const uint64_t masks =
-      Decision::bytes(width, band) + layout.soft_bytes + digits * room_for_planes(shape);
-  const uint64_t camera =
-      options.stabilize == Stabilize::off
-          ? 0
-          : Stabilizer::bytes(width, height) + Restorer::bytes(width, height, digits == 2);
-  layout.bytes = saturating_sum(
-      saturating_sum(layout.store_bytes, masks + camera),
-      learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
-                    Workers::count(options.threads)));
-  return layout;
-}
-
-}  // namespace
-
-LivePlan plan_of(const EngineOptions& options, int width, int height) {
-  return plan_for(options, *learner_of(options, width, height), width, height);
-}
-
-std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int height) {
-  LearnOptions learnt = options;
-  const bool moves = options.stabilize != Stabilize::off && options.method != Method::robust;
-  if (moves) learnt.chroma_columns = learnt.chroma_rows = 1;
-  return Learner::make(learnt, width, band_of(options, width, height));
-}
-
 Models models_of(Mode mode, int late_frames) {
   if (mode == Mode::live) return Models::two_of_live;
   return late_frames > 0 ? Models::two : Models::one;
-}
-
-EngineLayout layout_of(const EngineOptions& options, int width, int height) {
-  if (has_too_many_pixels(width, height)) {
-    EngineLayout layout;
-    layout.bytes = UINT64_MAX;
-    return layout;
-  }
-  const auto learner = learner_of(options, width, height);
-  if (options.mode == Mode::live)
-    return layout_with(options, *learner, width, height,
-                       plan_for(options, *learner, width, height).most_late_frames());
-  // Less time for a solve where there is no room for more frames.
-  for (int late = options.team ? 0 : late_frames_of(options, *learner);; late /= 2) {
-    const EngineLayout layout = layout_with(options, *learner, width, height, late);
-    if (late == 0 || layout.bytes <= options.max_memory) return layout;
-  }
-}
-
-std::string describe(const EngineOptions& options, int width, int height) {
-  return std::to_string(options.window_size) + " frames of " + std::to_string(width) + "x" +
-         std::to_string(height);
 }
 
 Band band_of(const EngineOptions& options, int width, int height) {
@@ -142,7 +78,20 @@ Band band_of(const EngineOptions& options, int width, int height) {
   return Band(options.team, std::move(ends), (halo + together - 1) / together * together);
 }
 
-namespace {
+// Frames that a camera's movement moves share no samples, which only a learner whose solves are one
+// piece can meet while frames come.
+std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, const Band& band) {
+  LearnOptions learnt = options;
+  const bool moves = options.stabilize != Stabilize::off && options.method != Method::robust;
+  if (moves) learnt.chroma_columns = learnt.chroma_rows = 1;
+  return Learner::make(learnt, width, band);
+}
+
+// "100 frames of 640x480".
+std::string describe(const EngineOptions& options, int width, int height) {
+  return std::to_string(options.window_size) + " frames of " + std::to_string(width) + "x" +
+         std::to_string(height);
+}
 
 Status check_team(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
@@ -169,8 +118,6 @@ Status check_team(const EngineOptions& options, int width, int height) {
                                        std::to_string(most) + " processes at most: start fewer"};
   return {};
 }
-
-}  // namespace
 
 Status check_options(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
@@ -201,27 +148,108 @@ Status check_options(const EngineOptions& options, int width, int height) {
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
-  if (Status status = check_team(options, width, height); !status.ok()) return status;
-  const EngineLayout layout = layout_of(options, width, height);
-  if (layout.bytes == UINT64_MAX)
-    return {Code::too_much_memory,
-            "A window-size of " + describe(options, width, height) +
+  return check_team(options, width, height);
+}
+
+}  // namespace
+
+EnginePlan::EnginePlan(const EngineOptions& options, int width, int height)
+    : options_(options), width_(width), height_(height) {
+  status_ = check_options(options, width, height);
+  if (!status_.ok()) return;
+  if (has_too_many_pixels(width, height)) {
+    layout_.bytes = UINT64_MAX;
+  } else {
+    band_ = band_of(options, width, height);
+    learner_ = learner_of(options, width, band_);
+    const bool live = options.mode == Mode::live;
+    if (live) live_ = plan_of(options, *learner_, width, height);
+    int late = 0;
+    if (live)
+      late = live_.most_late_frames();
+    else if (!options.team)
+      late = late_frames_of(options, *learner_);
+    layout_ = layout_with(late);
+    // Less time for a solve where there is no room for more frames.
+    while (!live && late > 0 && layout_.bytes > options.max_memory)
+      layout_ = layout_with(late /= 2);
+    models_ = models_of(options.mode, layout_.late_frames);
+  }
+  status_ = check_memory();
+}
+
+EngineLayout EnginePlan::layout_with(int late_frames) const {
+  const int height = band_.rows();
+  const bool live = options_.mode == Mode::live;
+  EngineLayout layout;
+  layout.late_frames = late_frames;
+  layout.delay = live ? 0 : options_.window_size - 1 + late_frames;
+  layout.sample_step = learner_->sample_steps().front();
+  layout.capacity = options_.window_size + late_frames;
+  // They are read until the last of them has left.
+  if (!live && learner_->may_read_frames(options_.window_size))
+    layout.capacity += options_.window_size;
+  const FrameContents contents = learner_->contents();
+  const ChromaShape shape = {width_, height, contents.chroma_columns, contents.chroma_rows};
+  const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
+  layout.frame_bytes = digits * PlaneSlots::bytes(layout.capacity, shape);
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width_, band_, contents);
+  if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width_, height_);
+  const uint64_t masks =
+      Decision::bytes(width_, band_) + layout.soft_bytes + digits * room_for_planes(shape);
+  const uint64_t camera =
+      options_.stabilize == Stabilize::off
+          ? 0
+          : Stabilizer::bytes(width_, height) + Restorer::bytes(width_, height, digits == 2);
+  layout.bytes = saturating_sum(
+      saturating_sum(layout.store_bytes, masks + camera),
+      learner_->bytes(options_.window_size, layout.capacity, models_of(options_.mode, late_frames),
+                      Workers::count(options_.threads)));
+  return layout;
+}
+
+Status EnginePlan::check_memory() const {
+  const std::string window = describe(options_, width_, height_);
+  if (layout_.bytes == UINT64_MAX)
+    return {Status::Code::too_much_memory,
+            "A window-size of " + window +
                 " needs more memory than there can be, whatever max-memory allows: scale the video "
                 "down, or lower window-size."};
-  const uint64_t solver = Learner::make(options, width, band_of(options, width, height))
-                              ->solver_bytes(options.window_size);
-  if (solver > options.max_memory)
-    return {Code::too_much_memory,
-            "solver=adjoint with a window-size of " + describe(options, width, height) +
-                " needs about " + std::to_string(solver) + " bytes and max-memory allows " +
-                std::to_string(options.max_memory) +
+  const uint64_t solver = learner_->solver_bytes(options_.window_size);
+  if (solver > options_.max_memory)
+    return {Status::Code::too_much_memory,
+            "solver=adjoint with a window-size of " + window + " needs about " +
+                std::to_string(solver) + " bytes and max-memory allows " +
+                std::to_string(options_.max_memory) +
                 ": use solver=gram, lower window-size, or scale the video down."};
-  if (layout.bytes > options.max_memory)
-    return {Code::too_much_memory,
-            "A window-size of " + describe(options, width, height) + " needs " +
-                std::to_string(layout.bytes) + " bytes (" + std::to_string(layout.frame_bytes) +
-                " for its frames) and max-memory allows " + std::to_string(options.max_memory) +
+  if (layout_.bytes > options_.max_memory)
+    return {Status::Code::too_much_memory,
+            "A window-size of " + window + " needs " + std::to_string(layout_.bytes) + " bytes (" +
+                std::to_string(layout_.frame_bytes) + " for its frames) and max-memory allows " +
+                std::to_string(options_.max_memory) +
                 ": lower window-size, scale the video down, or raise max-memory."};
+  return {};
+}
+
+Status EnginePlan::alpha_refused(uint64_t store_bytes) const {
+  return {
+      Status::Code::too_much_memory,
+      "A window-size of " + describe(options_, width_, band_.rows()) +
+          " whose alpha varies needs " +
+          std::to_string(layout_.bytes - layout_.store_bytes + store_bytes) +
+          " bytes and max-memory allows " + std::to_string(options_.max_memory) +
+          ": lower window-size, scale the video down, take the alpha out, or raise max-memory."};
+}
+
+Status EnginePlan::may_learn_from(const Learnt& learnt) const {
+  if (!band_.is_whole())
+    return {Status::Code::invalid_options, "processes that share a window load no background"};
+  if (learnt.width != width_ || learnt.height != height_)
+    return {Status::Code::invalid_options,
+            "it is the background of " + std::to_string(learnt.width) + "x" +
+                std::to_string(learnt.height) + " video and this video is " +
+                std::to_string(width_) + "x" + std::to_string(height_) +
+                ": scale the video, or save the background of video of this size."};
   return {};
 }
 

@@ -1,0 +1,197 @@
+#include "core/engine/leaving_frame.h"
+
+#include <algorithm>
+
+#include "core/passes/bands.h"
+#include "core/passes/read_samples.h"
+#include "core/passes/residual.h"
+
+namespace qdmd {
+
+OutputTask task_of_background(const FrameStore& frames, const BackgroundModel& model) {
+  OutputTask task = {};
+  // The background needs no frame, but rows of one are skipped over.
+  for (int c = 0; c < kChannels; ++c) task.x[c] = frames.window().plane(0, 0);
+  task.model = &model;
+  task.output = Output::background;
+  task.constant_alpha = 255;
+  task.constant_alpha_low = static_cast<uint8_t>((1 << frames.low_bits()) - 1);
+  return task;
+}
+
+LeavingFrame::LeavingFrame(const Stage& stage, Schedule* schedule, const Levels& levels, bool soft)
+    : stage_(stage), schedule_(schedule), levels_(levels) {
+  // Pages are touched once somebody wants more than the background.
+  room_ = std::make_unique_for_overwrite<uint8_t[]>((deep() ? 2 : 1) *
+                                                    room_for_planes(frames().window().shape()));
+  if (soft) soft_mask_ = std::make_unique<SoftMask>(frames().width(), frames().height());
+}
+
+void LeavingFrame::flush() {
+  done_ = {};
+  schedule_->flush();
+  if (soft_mask_) soft_mask_->forget();
+}
+
+uint64_t LeavingFrame::soft_bytes() const {
+  return soft_mask_ ? SoftMask::bytes(frames().width(), frames().height()) : 0;
+}
+
+Pose LeavingFrame::pose() const { return frames().pose(slot()); }
+
+// Once a frame.
+void LeavingFrame::meet() {
+  if (done_.meet) return;
+  schedule_->meet(schedule_->next_index());
+  const size_t planes = room_for_planes(frames().window().shape());
+  high_ = PlaneRows(frames().window().picture(slot()), room_.get());
+  if (deep()) low_ = PlaneRows(frames().low_picture(slot()), room_.get() + planes);
+  done_.meet = true;
+}
+
+// What is needed for a picture, without a mask. Samples are where they are, or are going to be.
+OutputTask LeavingFrame::task_of(Output output) {
+  meet();
+  schedule_->show(schedule_->next_index());
+  OutputTask task = task_of_background(frames(), stage_.background->model());
+  task.output = output;
+  for (int c = 0; output != Output::background && c < kChannels; ++c) {
+    task.x[c] = high_.plane(c);
+    if (deep()) task.low[c] = low_.plane(c);
+  }
+  task.alpha = frames().alpha(slot());
+  task.constant_alpha = frames().constant_alpha(slot());
+  if (deep()) {
+    task.alpha_low = frames().alpha_low(slot());
+    task.constant_alpha_low = frames().constant_alpha_low(slot());
+  }
+  return task;
+}
+
+// Once a frame, where pixels share samples.
+void LeavingFrame::read() {
+  if (done_.read) return;
+  high_.read_all(pool());
+  if (deep()) low_.read_all(pool());
+  done_.read = true;
+}
+
+// Once a frame.
+void LeavingFrame::decide(OutputTask* task) {
+  if (!done_.decide) stage_.background->decide(high_, deep() ? &low_ : nullptr, pool());
+  // It has read all rows, too.
+  done_.decide = done_.read = true;
+  task->mask = stage_.background->decision().mask();
+  task->shaded = stage_.background->decision().shaded();
+}
+
+// Once a frame.
+void LeavingFrame::soften(const Levels& levels, OutputTask* task) {
+  if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames().width(), frames().height());
+  const Background& background = *stage_.background;
+  const SoftEdge edge = {wishes().mask_softness, background.report().foreground.threshold};
+  if (!done_.soften)
+    soft_mask_->make(background.decision(), task->x, edge, wishes().ignored, pool());
+  done_.soften = true;
+  task->mask = soft_mask_->alpha();
+  task->soft = true;
+  std::copy_n(levels.black, kChannels, task->black);
+}
+
+// From the canvas to where the frame's camera looked. level: L is needed.
+void LeavingFrame::return_to_camera(OutputTask* task, bool level) {
+  const Pose pose = this->pose();
+  if (pose.is_rest() || wishes().stabilize_output) return;
+  for (int c = 0; c < kChannels; ++c) {
+    task->x[c] = frames().untouched(slot(), c);
+    if (deep()) task->low[c] = frames().untouched_low(slot(), c);
+  }
+  Restorer& restorer = *stage_.restorer;
+  Resampler* const resampler = &stage_.stabilizer->resampler();
+  if (level) {
+    restorer.write_canvas(*task->model, frames().window().pixels(), pool());
+    restorer.restore_level(pose, task->x, task->low, resampler, pool());
+    for (int c = 0; c < kChannels; ++c) {
+      task->level[c] = restorer.level(c);
+      task->level_low[c] = restorer.level_low(c);
+    }
+    task->level_stride = static_cast<size_t>(frames().width());
+  }
+  // What is ignored has its place in the frame.
+  const auto ignore = [&](uint8_t* mask) {
+    wishes().ignored.clear_rows(0, frames().height(), frames().width(), mask);
+    return mask;
+  };
+  if (task->mask)
+    task->mask = ignore(restorer.restore_mask(pose, task->mask, !task->soft, resampler, pool()));
+  if (task->shaded)
+    task->shaded = ignore(restorer.restore_shaded(pose, task->shaded, resampler, pool()));
+}
+
+void LeavingFrame::write(Output output, const Levels& levels, const MutableImageView& out) {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(output);
+    const Decision& decision = stage_.background->decision();
+    const bool masked = output == Output::mask || output == Output::cutout;
+    if (masked)
+      decide(&task);
+    else if (output != Output::background)
+      read();
+    if (done_.decide && !masked && !out.bits.is_deep()) {
+      decision.level(0, task.level);
+      task.level_stride = decision.level_stride();
+    }
+    if (masked && wishes().mask_softness > 0) soften(levels, &task);
+    return_to_camera(&task, output == Output::background || output == Output::foreground);
+    const Band& band = frames().band();
+    const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
+    const int steps = (height + together - 1) / together;
+    const auto write = [&](int first, int count) {
+      const int row = first * together;
+      write_picture(task, levels, out, top + row, std::min(count * together, height - row));
+    };
+    for_rows(pool(), steps, frames().window().pixels(), write);
+  });
+}
+
+const uint8_t* LeavingFrame::whole_mask() {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  return flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::mask);
+    decide(&task);
+    return stage_.background->decision().whole_mask();
+  });
+}
+
+void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::mask);
+    decide(&task);
+    return_to_camera(&task, true);
+    std::copy_n(task.mask, frames().window().pixels(), mask);
+    const auto width = static_cast<size_t>(frames().width());
+    for (int y = 0; y < frames().height(); ++y) {
+      const size_t first = static_cast<size_t>(y) * width;
+      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      const uint8_t* level[3];
+      stage_.background->decision().level(y, level);
+      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c] + first;
+      residual_norm(x, level, width, residual + first);
+    }
+  });
+}
+
+void LeavingFrame::skip() {
+  flushed_if_it_throws(this, [&] { schedule_->leave(); });
+  if (soft_mask_ && !done_.soften) soft_mask_->forget();
+  done_ = {};
+}
+
+void LeavingFrame::pop(Output output, const MutableImageView& out) {
+  write(output, levels_, out);
+  skip();
+}
+
+}  // namespace qdmd
