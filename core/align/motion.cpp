@@ -9,13 +9,13 @@ namespace {
 constexpr int kLandmarks = 1024, kLandmarksAbove = 512;
 // Pixels along the short side of the pyramid's top, at least.
 constexpr int kTop = 20;
-// Of 4 x 4 parts of the picture, so many must have landmarks.
+// So many of 4 x 4 parts of the picture must have landmarks.
 constexpr int kFewestParts = 7;
 // Pixels below which the camera is at rest.
 constexpr double kRest = 0.1;
 // Standard deviations by which a shift must be known.
 constexpr double kSure = 4;
-// Of what is searched in each direction: the share of the picture's longer side.
+// What is searched in each direction, as a share of the picture's longer side.
 constexpr double kReach = 1.0 / 8;
 // Less agreement than this is none.
 constexpr double kLeastAgree = 0.25;

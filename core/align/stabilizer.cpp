@@ -16,7 +16,7 @@ constexpr double kSharper = 1.03;
 // Pixels that wake it, and so little for so many frames that it sleeps again.
 constexpr double kWakes = 0.75, kCalm = 0.2;
 constexpr int kSleeps = 250;
-// Of the picture's longer side: further beside is another view.
+// A share of the picture's longer side: further beside is another view.
 constexpr double kFarthest = 1.0 / 8;
 // Frames in a row that are beyond that, and that show nothing that is known.
 constexpr int kBeyond = 8, kLost = 100;
@@ -105,7 +105,7 @@ Pose Stabilizer::follow(const uint8_t* grey, const IgnoredAreas& ignored) {
   return pose_;
 }
 
-// Of the newest frame.
+// The pose that the newest frame is moved by.
 Pose Stabilizer::applied() {
   const double way = largest_way(pose_, Pose(), width_, height_);
   calm_ = way < kCalm ? calm_ + 1 : 0;
