@@ -3,10 +3,10 @@
 
 #include <gst/gst.h>
 
+#include "core/base/ignored_areas.h"
 #include "core/engine/engine_options.h"
 #include "core/foreground/decision.h"
-#include "core/foreground/foreground.h"
-#include "core/foreground/ignored.h"
+#include "core/foreground/picture.h"
 
 namespace qdmd {
 

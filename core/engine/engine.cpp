@@ -6,7 +6,6 @@
 
 #include "core/engine/batch_schedule.h"
 #include "core/engine/live_schedule.h"
-#include "core/foreground/picture.h"
 #include "core/passes/bands.h"
 #include "core/passes/read_samples.h"
 #include "core/passes/residual.h"
@@ -42,7 +41,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       FrameStore(layout_.capacity, width, band, learner->contents(), options.max_memory - beside);
   // Its pages are touched once somebody wants more than the background.
   next_chroma_ = std::make_unique_for_overwrite<uint8_t[]>(
-      (options.low_bits() > 0 ? 2 : 1) * room_for_planes(frames_.window().shape()));
+      room_for_planes(frames_.window().shape(), options.depth));
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan.hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -55,7 +54,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   background_->learner().set_absorb_frames(absorb_frames_);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
-    restorer_ = std::make_unique<Restorer>(width, height, options.low_bits());
+    restorer_ = std::make_unique<Restorer>(width, height, options.depth);
   }
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_,
                        &clock_,  stabilizer_.get(), restorer_.get()};
@@ -192,8 +191,7 @@ OutputTask Engine::task_of(Output output) {
   for (int c = 0; c < kChannels; ++c) task.x[c] = frames_.window().plane(0, 0);
   task.model = &background_->model();
   task.output = output;
-  task.constant_alpha = 255;
-  task.constant_alpha_low = static_cast<uint8_t>((1 << frames_.low_bits()) - 1);
+  task.constant_alpha = static_cast<uint16_t>((1 << frames_.depth()) - 1);
   return task;
 }
 
@@ -205,50 +203,39 @@ OutputTask Engine::next_task(Output output) {
   if (output != Output::background) name_planes(slot, &task);
   task.alpha = frames_.alpha(slot);
   task.constant_alpha = frames_.constant_alpha(slot);
-  if (frames_.low_bits() > 0) {
-    task.alpha_low = frames_.alpha_low(slot);
-    task.constant_alpha_low = frames_.constant_alpha_low(slot);
-  }
   return task;
 }
 
 // Where their samples are, or are going to be.
 void Engine::name_planes(int slot, OutputTask* task) {
   next_ = PlaneRows(frames_.window().picture(slot), next_chroma_.get());
-  for (int c = 0; c < kChannels; ++c) task->x[c] = next_.plane(c);
-  if (frames_.low_bits() == 0) return;
-  next_low_ = PlaneRows(frames_.low_picture(slot),
-                        next_chroma_.get() + room_for_planes(frames_.window().shape()));
-  for (int c = 0; c < kChannels; ++c) task->low[c] = next_low_.plane(c);
+  for (int c = 0; c < kChannels; ++c) task->x[c] = next_.samples(c);
 }
 
 // Where pixels share samples, once a frame.
 void Engine::read_next() {
   if (!read_) next_.read_all(workers_->idle_pool());
-  if (!read_ && frames_.low_bits() > 0) next_low_.read_all(workers_->idle_pool());
   read_ = true;
 }
 
 // Once a frame.
 void Engine::decide_next(OutputTask* task) {
-  if (!decided_)
-    background_->decide(next_, frames_.low_bits() > 0 ? &next_low_ : nullptr,
-                        workers_->idle_pool());
+  if (!decided_) background_->decide(next_, workers_->idle_pool());
   decided_ = read_ = true;
   task->mask = background_->decision().mask();
   task->shaded = background_->decision().shaded();
 }
 
 // Once a frame.
-void Engine::soften(const Levels& levels, OutputTask* task) {
+void Engine::soften(OutputTask* task) {
   if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames_.width(), frames_.height());
   const SoftEdge edge = {options_.mask_softness, background_->report().foreground.threshold};
+  const uint8_t* const x[3] = {task->x[0].high, task->x[1].high, task->x[2].high};
   if (!softened_)
-    soft_mask_->make(background_->decision(), task->x, edge, ignored_, workers_->idle_pool());
+    soft_mask_->make(background_->decision(), x, edge, ignored_, workers_->idle_pool());
   softened_ = true;
   task->mask = soft_mask_->alpha();
   task->soft = true;
-  std::copy_n(levels.black, kChannels, task->black);
 }
 
 Pose Engine::next_pose() const {
@@ -260,19 +247,13 @@ void Engine::return_to_frame(OutputTask* task, bool level) {
   const Pose pose = next_pose();
   if (pose.is_rest() || stabilize_output_) return;
   const int slot = frames_.slot(frames_.size() - queue_.pending);
-  for (int c = 0; c < kChannels; ++c) {
-    task->x[c] = frames_.untouched(slot, c);
-    if (frames_.low_bits() > 0) task->low[c] = frames_.untouched_low(slot, c);
-  }
+  for (int c = 0; c < kChannels; ++c) task->x[c] = frames_.untouched(slot, c);
   Resampler* const resampler = &stabilizer_->resampler();
   Pool* const pool = workers_->idle_pool();
   if (level) {
     restorer_->write_canvas(*task->model, frames_.window().pixels(), pool);
-    restorer_->restore_level(pose, task->x, task->low, resampler, pool);
-    for (int c = 0; c < kChannels; ++c) {
-      task->level[c] = restorer_->level(c);
-      task->level_low[c] = restorer_->level_low(c);
-    }
+    restorer_->restore_level(pose, task->x, resampler, pool);
+    for (int c = 0; c < kChannels; ++c) task->level[c] = restorer_->level(c);
     task->level_stride = static_cast<size_t>(frames_.width());
   }
   // What is ignored has its place in the frame.
@@ -297,10 +278,11 @@ void Engine::foreground(uint8_t* mask, uint8_t* residual) {
     const auto width = static_cast<size_t>(frames_.width());
     for (int y = 0; y < frames_.height(); ++y) {
       const size_t first = static_cast<size_t>(y) * width;
-      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      const uint8_t* const x[3] = {task.x[0].high + first, task.x[1].high + first,
+                                   task.x[2].high + first};
       const uint8_t* level[3];
       background_->decision().level(y, level);
-      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c] + first;
+      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c].high + first;
       residual_norm(x, level, width, residual + first);
     }
   });
@@ -358,10 +340,12 @@ void Engine::write(Output output, const Levels& levels, const MutableImageView& 
     else if (output != Output::background)
       read_next();
     if (decided_ && !masked && !out.bits.is_deep()) {
-      background_->decision().level(0, task.level);
+      const uint8_t* level[3];
+      background_->decision().level(0, level);
+      std::copy_n(level, kChannels, task.level);
       task.level_stride = background_->decision().level_stride();
     }
-    if (masked && options_.mask_softness > 0) soften(levels, &task);
+    if (masked && options_.mask_softness > 0) soften(&task);
     return_to_frame(&task, output == Output::background || output == Output::foreground);
     const int top = band().own_begin(), height = band().own_rows(), together = rows_together(out);
     const int steps = (height + together - 1) / together;

@@ -5,6 +5,7 @@
 
 #include "core/engine/engine_options.h"
 #include "core/engine/schedule.h"
+#include "core/foreground/picture.h"
 #include "core/foreground/soft_mask.h"
 
 namespace qdmd {
@@ -157,7 +158,7 @@ class Engine {
   void name_planes(int slot, OutputTask* task);
   void read_next();
   void decide_next(OutputTask* task);
-  void soften(const Levels& levels, OutputTask* task);
+  void soften(OutputTask* task);
   void pass_wishes();
   Status alpha_refused() const;
   template <typename Action>
@@ -181,7 +182,7 @@ class Engine {
   Queue queue_;
   // Of the frame that leaves next.
   bool decided_ = false, softened_ = false, read_ = false;
-  PlaneRows next_, next_low_;
+  PlaneRows next_;
   std::unique_ptr<uint8_t[]> next_chroma_;  // of each pixel, where pixels share samples
   // The last member: its threads end before what they work on.
   std::unique_ptr<Workers> workers_;

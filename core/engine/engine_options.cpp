@@ -73,16 +73,15 @@ EngineLayout layout_with(const EngineOptions& options, const Learner& learner, i
   if (!live && learner.may_read_frames(options.window_size)) layout.capacity += options.window_size;
   const FrameContents contents = learner.contents();
   const ChromaShape shape = {width, height, contents.chroma_columns, contents.chroma_rows};
-  const uint64_t digits = options.low_bits() > 0 ? 2 : 1;
-  layout.frame_bytes = digits * PlaneSlots::bytes(layout.capacity, shape);
+  layout.frame_bytes = PlaneSlots::bytes(layout.capacity, shape, options.depth);
   layout.store_bytes = FrameStore::bytes(layout.capacity, width, band, contents);
   if (options.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks =
-      Decision::bytes(width, band) + layout.soft_bytes + digits * room_for_planes(shape);
+      Decision::bytes(width, band) + layout.soft_bytes + room_for_planes(shape, options.depth);
   const uint64_t camera =
       options.stabilize == Stabilize::off
           ? 0
-          : Stabilizer::bytes(width, height) + Restorer::bytes(width, height, digits == 2);
+          : Stabilizer::bytes(width, height) + Restorer::bytes(width, height, options.depth);
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, masks + camera),
       learner.bytes(options.window_size, layout.capacity, models_of(options.mode, late_frames),
@@ -148,7 +147,7 @@ Status check_team(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
   if (!options.team) return {};
   if (options.mode != Mode::batch || options.stabilize != Stabilize::off ||
-      options.mask_softness > 0 || options.low_bits() > 0)
+      options.mask_softness > 0 || options.depth > 8)
     return {
         Code::invalid_options,
         "processes share a window in mode=batch with stabilize=off and mask-softness=0 only, of "

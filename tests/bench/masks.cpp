@@ -53,7 +53,7 @@ struct Street {
         background[c].push_back(seen[kFrames / 2]);
       }
     model.make_room(size.pixels(), false);
-    model.freeze_as(background, nullptr, size.pixels());
+    model.freeze_as({8, {background[0], background[1], background[2]}, {}}, nullptr, size.pixels());
     model.set_time(0);
     limits.assign(size.pixels(), 30);
   }

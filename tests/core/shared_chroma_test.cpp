@@ -79,7 +79,8 @@ TEST(SharedChroma, HasTheProductsOfAllPixels) {
           constexpr int kCapacity = 19;
           Frames frames({width, height, 2, rows}, kCapacity);
           Pool pool(threads);
-          SlidingGram gram(kCapacity, frames.shape, &pool, kernel), plain(kCapacity, &pool, kernel);
+          SlidingGram gram(kCapacity, frames.shape, 8, &pool, kernel),
+              plain(kCapacity, &pool, kernel);
           // More at once than are multiplied together, and past the end of the ring.
           for (int group : {1, 3, 18, 2}) {
             for (int i = 0; i < group; ++i) frames.append(group == 3);
