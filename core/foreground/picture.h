@@ -31,7 +31,7 @@ struct OutputTask {
   bool soft = false;        // the mask
   // L at that time, if it is already computed, in rows that are `level_stride` samples apart; or
   // none.
-  Samples level[3];
+  Samples level[3] = {};
   size_t level_stride = 0;
 };
 

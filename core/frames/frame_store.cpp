@@ -16,10 +16,6 @@
 namespace qdmd {
 namespace {
 
-size_t pixels_of(int width, int height) {
-  return static_cast<size_t>(width) * static_cast<size_t>(height);
-}
-
 ChromaShape shape_of(int width, int height, const FrameContents& contents) {
   return {width, height, contents.chroma_columns, contents.chroma_rows};
 }
