@@ -17,7 +17,7 @@ template <typename T>
 struct Room {
   alignas(64) T shown[2][3][kMaxRun], level[3][kMaxRun], own[kMaxRun], alpha[kMaxRun];
   alignas(64) T mean[3][kMaxRun], pairs[kMaxRun + 2];
-  alignas(64) uint8_t grey[kMaxRun];
+  alignas(64) uint8_t grey[2][kMaxRun];
 };
 
 // How the samples of a view lie in memory, as far as it matters who writes them. size: bytes of a
@@ -187,8 +187,9 @@ class Writer {
         if (task_.shaded) {
           // At least grey where only light differs.
           for (size_t p = 0; p < count; ++p)
-            room_.grey[p] = std::max(mask[p], static_cast<uint8_t>(task_.shaded[first + p] & 127));
-          grey = room_.grey;
+            room_.grey[r][p] =
+                std::max(mask[p], static_cast<uint8_t>(task_.shaded[first + p] & 127));
+          grey = room_.grey[r];
         }
         for (int c = 0; c < 3; ++c)
           if (!is_constant_[c]) shown[c] = fit(c, grey, count, to[c]);
@@ -198,8 +199,8 @@ class Writer {
         const uint8_t* kept = mask;
         if (task_.soft && has_alpha_) {
           // Where alpha fades, colours do not: who composites multiplies them.
-          for (size_t p = 0; p < count; ++p) room_.grey[p] = mask[p] ? 255 : 0;
-          kept = room_.grey;
+          for (size_t p = 0; p < count; ++p) room_.grey[r][p] = mask[p] ? 255 : 0;
+          kept = room_.grey[r];
         }
         for (int c = 0; c < 3; ++c)
           if (layout_.has(c)) cut(own(c), kept, black_[c], task_.soft && !has_alpha_, count, to[c]);

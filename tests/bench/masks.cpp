@@ -132,7 +132,8 @@ void add_softness(int softness, const Size& size) {
             soft = std::make_shared<SoftMask>(size.width, size.height)](Street& street) {
       const Comparison frame = street.frame(false);
       decision->decide(frame, nullptr);
-      return computed([&] { soft->make(*decision, frame.x, {softness, 18}, {}, nullptr); });
+      const uint8_t* const x[3] = {frame.x[0].high, frame.x[1].high, frame.x[2].high};
+      return computed([&] { soft->make(*decision, x, {softness, 18}, {}, nullptr); });
     };
   });
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/foreground/decision.h"
+#include "core/foreground/foreground.h"
 #include "core/foreground/picture.h"
 #include "core/passes/combine.h"
 #include "core/passes/planes.h"
