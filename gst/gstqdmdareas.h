@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "core/foreground/ignored.h"
+#include "core/base/ignored_areas.h"
 
 namespace qdmd {
 

@@ -2,7 +2,7 @@
 
 #include "core/engine/engine_options.h"
 #include "core/foreground/decision.h"
-#include "core/foreground/foreground.h"
+#include "core/foreground/picture.h"
 
 using qdmd::Output;
 using qdmd::Shadows;

@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "core/foreground/foreground.h"
+#include "core/foreground/picture.h"
 #include "gst/pointers.h"
 #include "gst/waitingframes.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/engine/engine_options.h"
 #include "core/engine/wishes.h"
-#include "core/foreground/foreground.h"
+#include "core/foreground/picture.h"
 
 namespace qdmd {
 

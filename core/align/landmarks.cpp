@@ -13,7 +13,7 @@ namespace {
 constexpr int kLeastSlope = 5;
 // Tukey's constant, in standard deviations.
 constexpr float kTukey = 4.685f;
-// Standard deviation, in levels, that samples have which are rounded and interpolated between.
+// The noise of samples that are rounded, and interpolated between.
 constexpr double kLeastNoise = 1.0;
 // The share of the residuals, from the smallest on, that tells the noise; of a normal distribution
 // it ends at 0.385 standard deviations.
@@ -33,7 +33,7 @@ float smoothed(const uint8_t* at, ptrdiff_t stride) {
   return static_cast<float>(sum) / 16;
 }
 
-// Such a mean between pixels, u to the right and v down from `at`, both below 1.
+// smoothed() between pixels, u to the right and v down from it, below 1.
 float smoothed(const uint8_t* at, ptrdiff_t stride, float u, float v) {
   float sum = 0;
   const float down[4] = {1 - v, 2 - v, 1 + v, v};
@@ -155,7 +155,7 @@ void Landmarks::read(const GreyView& frame, const Pose& pose, const GreyLight& l
   }
 }
 
-// The noise is read from the residuals that are small.
+// The noise that the small ones of the residuals tell.
 double Landmarks::noise_of_residuals() const {
   constexpr int kSteps = 4, kBins = 256;  // of 1/4 level
   std::array<int, kBins> bins{};
@@ -223,7 +223,7 @@ Fit Landmarks::solved(Fit fit) const {
       sums[a][kFree] += weighted * e;
     }
   }
-  // Normal noise has a mean likeness of 0.87.
+  // For normal noise it is 0.87.
   fit.agree = inside > 0 ? std::min(1.0, likeness / 0.87 / inside) : 0;
   // Where little of the canvas is in the frame, or nothing fits.
   if (fitting < kFewest || inside < count_ / 4) return fit;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/align/pose.h"
-#include "core/foreground/ignored.h"
+#include "core/base/ignored_areas.h"
 
 namespace qdmd {
 
@@ -68,7 +68,7 @@ class Landmarks {
   int most_, count_ = 0, width_ = 0, height_ = 0;
   std::vector<int32_t> x_, y_;
   std::vector<float> level_, right_, down_;  // levels, and their slopes a pixel
-  // Residuals of the frame that is compared; where a landmark is outside of it, one far away.
+  // Residuals of the frame that is compared, those outside of it far away.
   std::vector<float> residual_;
 };
 

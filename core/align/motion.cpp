@@ -15,7 +15,7 @@ constexpr int kFewestParts = 7;
 constexpr double kRest = 0.1;
 // Standard deviations by which a shift must be known.
 constexpr double kSure = 4;
-// The share of the picture's longer side that is searched in each direction.
+// What is searched in each direction, as a share of the picture's longer side.
 constexpr double kReach = 1.0 / 8;
 // Less agreement than this is none.
 constexpr double kLeastAgree = 0.25;

@@ -8,7 +8,7 @@
 
 namespace qdmd {
 
-// What is known of a frame's camera.
+// What a frame shows of the camera's motion.
 struct Motion {
   // `rest` where it differs by less than a tenth of a pixel from it, or by less than can be known.
   Pose pose;
@@ -33,8 +33,8 @@ class MotionFinder {
   // Too little in the reference tells where it is: nothing moves then.
   bool is_blank() const { return blank_; }
 
-  // Looks for a frame that comes after one which was at `before`: at `rest` first.
-  // turns: angle and scale are free.
+  // Finds that of a frame, which comes after one that was at `before`; it is looked for at `rest`
+  // first. turns: angle and scale are free.
   Motion find(const uint8_t* grey, const Pose& before, const Pose& rest, bool turns);
 
  private:

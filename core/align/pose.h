@@ -6,9 +6,9 @@
 
 namespace qdmd {
 
-// Where a frame lies on the canvas, the picture that the camera saw in its place of rest: the
-// frame's pixel f shows the canvas at c + shift + scale R(angle) (f - c), where c is the middle of
-// the picture and angles turn x towards y (clockwise, y being down).
+// Where a frame's pixels are on the canvas, the picture that the camera saw in its place of rest:
+// the frame's pixel f shows the canvas at c + shift + scale R(angle) (f - c), where c is the middle
+// of the picture and angles turn x towards y (clockwise, y being down).
 struct Pose {
   double x = 0, y = 0;  // pixels by which the camera looks to the right and down
   double angle = 0;     // radians

@@ -10,22 +10,14 @@ constexpr int kRowsPerBand = 64;
 
 }  // namespace
 
-void Resampler::run(const uint8_t* from, const Affine& place, uint8_t* to, int width, int height,
-                    Pool* pool) {
-  run_deep(from, nullptr, 0, place, to, nullptr, width, height, pool);
-}
-
-void Resampler::run_deep(const uint8_t* from, const uint8_t* from_low, int low_bits,
-                         const Affine& place, uint8_t* to, uint8_t* to_low, int width, int height,
-                         Pool* pool) {
+void Resampler::run(Samples from, int depth, const Affine& place, MutableSamples to, int width,
+                    int height, Pool* pool) {
   Resampling task;
-  task.low_bits = low_bits;
   task.from = from;
-  task.from_low = from_low;
   task.from_width = task.width = width;
   task.from_height = task.height = height;
   task.to = to;
-  task.to_low = to_low;
+  task.depth = depth;
   const auto single = [](double value) { return static_cast<float>(value); };
   task.places = {single(place.xx), single(place.xy), single(place.offset.x),
                  single(place.yx), single(place.yy), single(place.offset.y)};

@@ -7,7 +7,7 @@
 #include "core/align/motion.h"
 #include "core/align/resampler.h"
 #include "core/base/channels.h"
-#include "core/model/learnt.h"
+#include "core/base/colours.h"
 
 namespace qdmd {
 

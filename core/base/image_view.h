@@ -39,7 +39,7 @@ struct BasicImageView {
   // True: samples at `alpha` are padding; they are not read and are written as 255.
   bool alpha_is_padding = false;
   int width = 0, height = 0;
-  // Of all channels, and of alpha, unless they have a spacing of their own.
+  // Distances in all channels, and in alpha, unless they have a spacing of their own.
   ptrdiff_t pixel_stride = 0, row_stride = 0;  // bytes
   // The own spacing of channels 0 to 2 and of alpha (3); none if its pixel_stride is 0.
   Spacing own[4];

@@ -43,8 +43,8 @@ bool must_ask() {
 }
 #endif
 
-// Of whole large pages only: what is behind the last one would be taken with it. This is advice;
-// memory in small pages is as good.
+// Asks for whole large pages only: what is behind the last one would be taken with it. This is
+// advice; memory in small pages is as good.
 void ask(void* data, size_t bytes, bool large) {
 #ifdef MADV_HUGEPAGE
   if (bytes >= kLargePage && must_ask())

@@ -5,8 +5,8 @@
 
 namespace qdmd {
 
-// Of each channel. Chroma has one value for both, which is neutral: what is drawn in greys between
-// black and white then has no colour.
+// Black and white of each channel. Chroma has one value for both, which is neutral: what is drawn
+// in greys between black and white then has no colour.
 struct Levels {
   uint8_t black[3] = {0, 0, 0}, white[3] = {255, 255, 255};
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/dmd/snapshot_factor.h"
-#include "core/gram/window.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd {
 

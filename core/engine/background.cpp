@@ -23,7 +23,7 @@ Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room
     : room_(room),
       learner_(std::move(learner)),
       decision_(room.frames->width(), room.frames->band(), colours, steps, levels) {
-  for (BackgroundModel& model : models_) model.set_low_bits(room_.frames->low_bits());
+  for (BackgroundModel& model : models_) model.set_depth(room_.frames->depth());
   learner_->begin(room_);
 }
 
@@ -57,22 +57,12 @@ void Background::return_to(const Learnt& learnt) {
 void Background::remember(Learnt* learnt) const {
   const BackgroundModel& model = models_[newest_];
   const size_t count = pixels();
-  learnt->low_bits = model.low_bits();
-  for (auto& level : learnt->level) level.resize(count);
-  for (auto& low : learnt->low) low.resize(model.low_bits() > 0 ? count : 0);
+  OwnedPicture& picture = learnt->picture;
+  picture.resize(count, model.depth());
   for (size_t first = 0; first < count; first += kMaxRun) {
-    const auto of = [first](std::vector<uint8_t>* planes, uint8_t** out) {
-      for (size_t c = 0; c < kChannels; ++c) out[c] = planes[c].data() + first;
-    };
-    const size_t run = std::min(kMaxRun, count - first);
-    uint8_t *high[3], *low[3];
-    of(learnt->level, high);
-    if (model.low_bits() == 0) {
-      model.evaluate(first, run, high);
-      continue;
-    }
-    of(learnt->low, low);
-    model.evaluate_digits(first, run, high, low);
+    const MutableSamples out[3] = {picture.samples(0) + first, picture.samples(1) + first,
+                                   picture.samples(2) + first};
+    model.evaluate(first, std::min(kMaxRun, count - first), out);
   }
   if (model.limits()) learnt->limits.assign(model.limits(), model.limits() + count);
   learnt->noise = report_.foreground.noise;
@@ -81,9 +71,8 @@ void Background::remember(Learnt* learnt) const {
 
 void Background::show(const Learnt& learnt, State state) {
   const bool limits = learner_->makes_limits() && !learnt.limits.empty();
-  model().freeze_as(learnt.level, learnt.low, learnt.low_bits, limits ? &learnt.limits : nullptr,
-                    pixels());
-  learner_->follow(learnt.level);
+  model().freeze_as(learnt.picture, limits ? &learnt.limits : nullptr, pixels());
+  learner_->follow(learnt.picture.level);
   report_ = {};
   report_.foreground.noise = learnt.noise;
   set_wishes(wishes_);
@@ -114,12 +103,14 @@ void Background::finish(const Wishes& wishes) {
 // Whatever a learner did: no model with a number that is not one is ever in use.
 void Background::replace_next() {
   BackgroundModel& model = models_[next()];
-  const SnapshotRange snapshots = room_.frames->whole(*snapshots_);
-  model.begin(snapshots, mean_of_frames(snapshots.size()), true);
-  if (snapshots.shape().is_shared())
-    build_spread(snapshots, 0, pixels(), room_.pool, &model);
-  else
+  const TemporalModel mean = mean_of_frames(snapshots_->size());
+  if (snapshots_->shape().is_shared()) {
+    model.begin_from(snapshots_->size(), pixels(), mean);
+    build_spread(*snapshots_, 0, pixels(), room_.pool, &model);
+  } else {
+    model.begin(*snapshots_, mean, true);
     model.build_slice(0, pixels());
+  }
   next_report_.replaced = true;
   next_report_.dmd = {};
   next_report_.dmd.rank = next_report_.dmd.background_modes = 1;
@@ -133,15 +124,10 @@ void Background::rehearse(const Wishes& wishes) {
   const bool fixed = wishes.foreground_threshold > 0;
   BackgroundModel& model = models_[next()];
   const ForegroundStatistics& foreground = next_report_.foreground;
-  const SnapshotRange whole = room_.frames->whole(*snapshots_);
-  const bool deep = whole.low_bits() > 0;
-  const size_t spread = room_for_planes(snapshots_->shape());
-  std::vector<uint8_t> room((deep ? 2 : 1) * spread);
+  std::vector<uint8_t> room(room_for_planes(snapshots_->shape(), snapshots_->depth()));
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
     const PlaneRows x(snapshots_->picture(t), room.data());
-    const PlaneRows low =
-        deep ? PlaneRows(whole.low_picture(t), room.data() + spread) : PlaneRows();
     decide({{},
             &model,
             foreground.threshold,
@@ -149,11 +135,11 @@ void Background::rehearse(const Wishes& wishes) {
             fixed,
             &wishes.ignored,
             wishes.shadows},
-           x, deep ? &low : nullptr, room_.pool);
+           x, room_.pool);
   }
 }
 
-void Background::decide(const PlaneRows& x, const PlaneRows* low, Pool* pool) {
+void Background::decide(const PlaneRows& x, Pool* pool) {
   const bool fixed = wishes_.foreground_threshold > 0;
   decide({{},
           &model(),
@@ -162,16 +148,12 @@ void Background::decide(const PlaneRows& x, const PlaneRows* low, Pool* pool) {
           fixed,
           &wishes_.ignored,
           wishes_.shadows},
-         x, low, pool);
+         x, pool);
 }
 
-void Background::decide(Comparison frame, const PlaneRows& x, const PlaneRows* low, Pool* pool) {
-  for (int c = 0; c < kChannels; ++c) {
-    frame.x[c] = x.plane(c);
-    frame.low[c] = low ? low->plane(c) : nullptr;
-  }
+void Background::decide(Comparison frame, const PlaneRows& x, Pool* pool) {
+  for (int c = 0; c < kChannels; ++c) frame.x[c] = x.samples(c);
   frame.rows = &x;
-  frame.low_rows = low;
   decision_.decide(frame, pool);
 }
 

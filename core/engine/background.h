@@ -83,9 +83,9 @@ class Background {
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
 
-  // Decides the pixels of a frame, whose planes are x, against L; frames come in order. low: of
-  // samples of more than 8 bits what is below the highest 8, else null. Makes all of their rows.
-  void decide(const PlaneRows& x, const PlaneRows* low, Pool* pool);
+  // Decides the pixels of a frame, whose planes are x, against L; frames come in order. Makes all
+  // of their rows.
+  void decide(const PlaneRows& x, Pool* pool);
   // What it decided last.
   Decision& decision() { return decision_; }
   const Decision& decision() const { return decision_; }
@@ -97,7 +97,7 @@ class Background {
  private:
   void replace_next();
   void rehearse(const Wishes& wishes);
-  void decide(Comparison frame, const PlaneRows& x, const PlaneRows* low, Pool* pool);
+  void decide(Comparison frame, const PlaneRows& x, Pool* pool);
   size_t pixels() const { return room_.frames->window().pixels(); }
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 

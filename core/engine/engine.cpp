@@ -29,7 +29,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       options.colours, options.steps, options.levels);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
-    restorer_ = std::make_unique<Restorer>(width, height, options.low_bits());
+    restorer_ = std::make_unique<Restorer>(width, height, options.depth);
   }
   const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_,
                        &clock_,  stabilizer_.get(), restorer_.get()};

@@ -97,7 +97,7 @@ Status check_team(const EngineOptions& options, int width, int height) {
   using Code = Status::Code;
   if (!options.team) return {};
   if (options.mode != Mode::batch || options.stabilize != Stabilize::off ||
-      options.mask_softness > 0 || options.low_bits() > 0)
+      options.mask_softness > 0 || options.depth > 8)
     return {
         Code::invalid_options,
         "processes share a window in mode=batch with stabilize=off and mask-softness=0 only, of "
@@ -191,16 +191,15 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
     layout.capacity += options_.window_size;
   const FrameContents contents = learner_->contents();
   const ChromaShape shape = {width_, height, contents.chroma_columns, contents.chroma_rows};
-  const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
-  layout.frame_bytes = digits * PlaneSlots::bytes(layout.capacity, shape);
+  layout.frame_bytes = PlaneSlots::bytes(layout.capacity, shape, options_.depth);
   layout.store_bytes = FrameStore::bytes(layout.capacity, width_, band_, contents);
   if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width_, height_);
   const uint64_t masks =
-      Decision::bytes(width_, band_) + layout.soft_bytes + digits * room_for_planes(shape);
+      Decision::bytes(width_, band_) + layout.soft_bytes + room_for_planes(shape, options_.depth);
   const uint64_t camera =
       options_.stabilize == Stabilize::off
           ? 0
-          : Stabilizer::bytes(width_, height) + Restorer::bytes(width_, height, digits == 2);
+          : Stabilizer::bytes(width_, height) + Restorer::bytes(width_, height, options_.depth);
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, masks + camera),
       learner_->bytes(options_.window_size, layout.capacity, models_of(options_.mode, late_frames),

@@ -14,16 +14,15 @@ OutputTask task_of_background(const FrameStore& frames, const BackgroundModel& m
   for (int c = 0; c < kChannels; ++c) task.x[c] = frames.window().plane(0, 0);
   task.model = &model;
   task.output = Output::background;
-  task.constant_alpha = 255;
-  task.constant_alpha_low = static_cast<uint8_t>((1 << frames.low_bits()) - 1);
+  task.constant_alpha = static_cast<uint16_t>((1 << frames.depth()) - 1);
   return task;
 }
 
 LeavingFrame::LeavingFrame(const Stage& stage, Schedule* schedule, const Levels& levels, bool soft)
     : stage_(stage), schedule_(schedule), levels_(levels) {
   // Pages are touched once somebody wants more than the background.
-  room_ = std::make_unique_for_overwrite<uint8_t[]>((deep() ? 2 : 1) *
-                                                    room_for_planes(frames().window().shape()));
+  room_ = std::make_unique_for_overwrite<uint8_t[]>(
+      room_for_planes(frames().window().shape(), frames().depth()));
   if (soft) soft_mask_ = std::make_unique<SoftMask>(frames().width(), frames().height());
 }
 
@@ -43,9 +42,7 @@ Pose LeavingFrame::pose() const { return frames().pose(slot()); }
 void LeavingFrame::meet() {
   if (done_.meet) return;
   schedule_->meet(schedule_->next_index());
-  const size_t planes = room_for_planes(frames().window().shape());
-  high_ = PlaneRows(frames().window().picture(slot()), room_.get());
-  if (deep()) low_ = PlaneRows(frames().low_picture(slot()), room_.get() + planes);
+  planes_ = PlaneRows(frames().window().picture(slot()), room_.get());
   done_.meet = true;
 }
 
@@ -55,30 +52,23 @@ OutputTask LeavingFrame::task_of(Output output) {
   schedule_->show(schedule_->next_index());
   OutputTask task = task_of_background(frames(), stage_.background->model());
   task.output = output;
-  for (int c = 0; output != Output::background && c < kChannels; ++c) {
-    task.x[c] = high_.plane(c);
-    if (deep()) task.low[c] = low_.plane(c);
-  }
+  for (int c = 0; output != Output::background && c < kChannels; ++c)
+    task.x[c] = planes_.samples(c);
   task.alpha = frames().alpha(slot());
   task.constant_alpha = frames().constant_alpha(slot());
-  if (deep()) {
-    task.alpha_low = frames().alpha_low(slot());
-    task.constant_alpha_low = frames().constant_alpha_low(slot());
-  }
   return task;
 }
 
 // Once a frame, where pixels share samples.
 void LeavingFrame::read() {
   if (done_.read) return;
-  high_.read_all(pool());
-  if (deep()) low_.read_all(pool());
+  planes_.read_all(pool());
   done_.read = true;
 }
 
 // Once a frame.
 void LeavingFrame::decide(OutputTask* task) {
-  if (!done_.decide) stage_.background->decide(high_, deep() ? &low_ : nullptr, pool());
+  if (!done_.decide) stage_.background->decide(planes_, pool());
   // It has read all rows, too.
   done_.decide = done_.read = true;
   task->mask = stage_.background->decision().mask();
@@ -86,35 +76,28 @@ void LeavingFrame::decide(OutputTask* task) {
 }
 
 // Once a frame.
-void LeavingFrame::soften(const Levels& levels, OutputTask* task) {
+void LeavingFrame::soften(OutputTask* task) {
   if (!soft_mask_) soft_mask_ = std::make_unique<SoftMask>(frames().width(), frames().height());
   const Background& background = *stage_.background;
   const SoftEdge edge = {wishes().mask_softness, background.report().foreground.threshold};
-  if (!done_.soften)
-    soft_mask_->make(background.decision(), task->x, edge, wishes().ignored, pool());
+  const uint8_t* const x[3] = {task->x[0].high, task->x[1].high, task->x[2].high};
+  if (!done_.soften) soft_mask_->make(background.decision(), x, edge, wishes().ignored, pool());
   done_.soften = true;
   task->mask = soft_mask_->alpha();
   task->soft = true;
-  std::copy_n(levels.black, kChannels, task->black);
 }
 
 // From the canvas to where the frame's camera looked. level: L is needed.
 void LeavingFrame::return_to_camera(OutputTask* task, bool level) {
   const Pose pose = this->pose();
   if (pose.is_rest() || wishes().stabilize_output) return;
-  for (int c = 0; c < kChannels; ++c) {
-    task->x[c] = frames().untouched(slot(), c);
-    if (deep()) task->low[c] = frames().untouched_low(slot(), c);
-  }
+  for (int c = 0; c < kChannels; ++c) task->x[c] = frames().untouched(slot(), c);
   Restorer& restorer = *stage_.restorer;
   Resampler* const resampler = &stage_.stabilizer->resampler();
   if (level) {
     restorer.write_canvas(*task->model, frames().window().pixels(), pool());
-    restorer.restore_level(pose, task->x, task->low, resampler, pool());
-    for (int c = 0; c < kChannels; ++c) {
-      task->level[c] = restorer.level(c);
-      task->level_low[c] = restorer.level_low(c);
-    }
+    restorer.restore_level(pose, task->x, resampler, pool());
+    for (int c = 0; c < kChannels; ++c) task->level[c] = restorer.level(c);
     task->level_stride = static_cast<size_t>(frames().width());
   }
   // What is ignored has its place in the frame.
@@ -139,10 +122,12 @@ void LeavingFrame::write(Output output, const Levels& levels, const MutableImage
     else if (output != Output::background)
       read();
     if (done_.decide && !masked && !out.bits.is_deep()) {
-      decision.level(0, task.level);
+      const uint8_t* level[3];
+      decision.level(0, level);
+      std::copy_n(level, kChannels, task.level);
       task.level_stride = decision.level_stride();
     }
-    if (masked && wishes().mask_softness > 0) soften(levels, &task);
+    if (masked && wishes().mask_softness > 0) soften(&task);
     return_to_camera(&task, output == Output::background || output == Output::foreground);
     const Band& band = frames().band();
     const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
@@ -174,10 +159,11 @@ void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
     const auto width = static_cast<size_t>(frames().width());
     for (int y = 0; y < frames().height(); ++y) {
       const size_t first = static_cast<size_t>(y) * width;
-      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
+      const uint8_t* const x[3] = {task.x[0].high + first, task.x[1].high + first,
+                                   task.x[2].high + first};
       const uint8_t* level[3];
       stage_.background->decision().level(y, level);
-      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c] + first;
+      for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c].high + first;
       residual_norm(x, level, width, residual + first);
     }
   });

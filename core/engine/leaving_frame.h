@@ -53,12 +53,11 @@ class LeavingFrame {
   void meet();
   void read();
   void decide(OutputTask* task);
-  void soften(const Levels& levels, OutputTask* task);
+  void soften(OutputTask* task);
   void return_to_camera(OutputTask* task, bool level);
   FrameStore& frames() const { return *stage_.frames; }
   const Wishes& wishes() const { return stage_.background->wishes(); }
   int slot() const { return frames().slot(schedule_->next_index()); }
-  bool deep() const { return frames().low_bits() > 0; }
   Pool* pool() const { return stage_.workers->idle_pool(); }
 
   Stage stage_;
@@ -67,7 +66,7 @@ class LeavingFrame {
   std::unique_ptr<SoftMask> soft_mask_;
   Done done_;
   // The planes. Where pixels share samples, `room_` has those of each pixel.
-  PlaneRows high_, low_;
+  PlaneRows planes_;
   std::unique_ptr<uint8_t[]> room_;
 };
 

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
+#include "core/base/ignored_areas.h"
 #include "core/foreground/decision.h"
-#include "core/foreground/ignored.h"
 
 namespace qdmd {
 

@@ -53,7 +53,7 @@ struct Decision::Around {
       for (int c = 0; c < kChannels; ++c) {
         const int at = kAlong * c + i;
         level[at] = all.level_row(c, row) + left;
-        const uint8_t* const samples = all.now_.frame.x[c] + all.shape_.first(row);
+        const uint8_t* const samples = all.now_.frame.x[c].high + all.shape_.first(row);
         x[at] = samples + left;
         if (!at_edge) continue;
         // The border's pixels stand for those outside.
@@ -82,7 +82,7 @@ struct Decision::Lit {
         left + count + kReach <= shape.width) {
       const int top = y - kReach;
       for (int c = 0; c < kChannels; ++c) {
-        rows.x[c] = all.now_.frame.x[c] + shape.first(top) + left;
+        rows.x[c] = all.now_.frame.x[c].high + shape.first(top) + left;
         rows.l[c] = all.level_row(c, top) + left;
       }
       rows.differing = all.differing_row(top) + left;
@@ -194,21 +194,22 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
-  now_.whole = frame.low[0] && !now_.means;
+  now_.whole = frame.model->depth() > 8 && !now_.means;
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
   look();
   // All are there now.
-  now_.frame.rows = now_.frame.low_rows = nullptr;
+  now_.frame.rows = nullptr;
   if (now_.textures) {
     // The second frame is the first one that can differ from what was there before: it is looked
     // at again now that it is known what moves in it.
     const bool again = texture_.frames() == 1;
-    texture_.end_frame(frame.x, !again);
+    const uint8_t* const x[3] = {frame.x[0].high, frame.x[1].high, frame.x[2].high};
+    texture_.end_frame(x, !again);
     if (again) {
       clear_marks();
       in_rows([&](int first, int size) { explain(first, size); });
-      texture_.end_frame(frame.x);
+      texture_.end_frame(x);
     }
   }
   const bool learns = steps_.noise && !frame.fixed;
@@ -306,7 +307,6 @@ void Decision::look() {
 // L, and which pixels differ from it.
 void Decision::compare(int first_row, int row_count) {
   if (now_.frame.rows) now_.frame.rows->read(first_row, row_count);
-  if (now_.frame.low_rows) now_.frame.low_rows->read(first_row, row_count);
   const auto width = static_cast<size_t>(shape_.width);
   for (int y = first_row; y < first_row + row_count; ++y) {
     for (size_t left = 0; left < width; left += kMaxRun) {
@@ -314,8 +314,8 @@ void Decision::compare(int first_row, int row_count) {
       uint8_t* const level[3] = {level_row(0, y) + left, level_row(1, y) + left,
                                  level_row(2, y) + left};
       if (!now_.level_known) now_.frame.model->evaluate(first, count, level);
-      const uint8_t* const x[3] = {now_.frame.x[0] + first, now_.frame.x[1] + first,
-                                   now_.frame.x[2] + first};
+      const uint8_t* const x[3] = {now_.frame.x[0].high + first, now_.frame.x[1].high + first,
+                                   now_.frame.x[2].high + first};
       if (now_.whole)
         full_depth_mask(now_.frame, level, now_.threshold, first, count, differing_row(y) + left);
       else if (!now_.means)

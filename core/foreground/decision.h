@@ -7,15 +7,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/colours.h"
+#include "core/base/ignored_areas.h"
 #include "core/base/large_vector.h"
 #include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
-#include "core/foreground/ignored.h"
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/specks.h"
 #include "core/model/background_model.h"
-#include "core/model/learnt.h"
 #include "core/parallel/pool.h"
 #include "core/passes/read_samples.h"
 
@@ -30,7 +30,7 @@ enum class Shadows {
 
 // A frame and what it is compared with.
 struct Comparison {
-  const uint8_t* x[3];              // the frame's planes
+  Samples x[3];                     // the frame's planes
   const BackgroundModel* model;     // at the frame's time
   double threshold = 0;             // quaternion norm in levels above which a pixel differs
   const uint8_t* limits = nullptr;  // the same of each pixel, where that is more; or null
@@ -39,10 +39,8 @@ struct Comparison {
   // Where all is background, whatever the frame shows, and nothing is learnt from it; or null.
   const IgnoredAreas* ignored = nullptr;
   Shadows shadows = Shadows::background;
-  // Of samples of more than 8 bits what is below the highest 8 of x; or nulls.
-  const uint8_t* low[3] = {nullptr, nullptr, nullptr};
-  // What x and low are the planes of, if their rows are to be made; or nulls, if they are there.
-  const PlaneRows *rows = nullptr, *low_rows = nullptr;
+  // What x are the planes of, if their rows are to be made; or null, if they are there.
+  const PlaneRows* rows = nullptr;
 };
 
 // A pixel that differs from L is foreground unless
@@ -80,9 +78,9 @@ class Decision {
   void decide(const Comparison& frame, Pool* pool);
   // 255 where foreground, else 0; samples in row order.
   const uint8_t* mask() const { return of_.mask.data(); }
-  // The same of the whole picture.
+  // The mask of the whole picture.
   const uint8_t* whole_mask() const { return band_.is_whole() ? mask() : whole_.data(); }
-  // The same where shadows are marked: 255 where light alone differs.
+  // A second mask where shadows are marked: 255 where light alone differs.
   const uint8_t* shaded() const {
     return now_.frame.shadows == Shadows::marked ? of_.shaded.data() : nullptr;
   }
@@ -102,15 +100,15 @@ class Decision {
     Shape(int width, const Band& band, bool votes);
     size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
     size_t padded() const { return stride * static_cast<size_t>(height); }
-    // Of a row with margins, and of one without.
+    // Where a row with margins begins, and one without.
     size_t offset(int y) const {
       return static_cast<size_t>(y) * stride + static_cast<size_t>(margin);
     }
     size_t first(int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width); }
-    // Of a strip; that behind the last one is the height.
+    // The first row of a strip; that behind the last one is the height.
     int top(int strip) const { return static_cast<int>(int64_t{height} * strip / strips); }
   };
-  // Of the frame: L, what differs from it, and what is foreground before and after the vote; and
+  // A frame's L, what differs from it, and what is foreground before and after the vote; and
   // where light alone differs.
   struct Pictures {
     LargeVector<uint8_t> level[3], differing, foreground, mask, shaded;
@@ -139,7 +137,7 @@ class Decision {
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
   void clear_marks();
   void share_mask();
-  // Of the rows that are kept that row of the mask, of the picture's if there is none.
+  // The mask's row y of those that are kept, or the picture's if there is none.
   const uint8_t* mask_row(int y) const;
   void look();
   // Steps of a frame; threads have rows of their own.
@@ -163,7 +161,7 @@ class Decision {
   MovingTexture texture_;
   PixelNoise noise_;
   Specks specks_;
-  // Of each strip: itself and those beside it, while a frame's are not compared yet.
+  // By strip: itself and those beside it are counted, while a frame's are not compared yet.
   std::vector<std::atomic<int>> unknown_;
   std::vector<uint8_t> whole_, packed_;  // of a band: the picture's mask, and its bits
   int64_t frames_ = 0;

@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <span>
-#include <utility>
 #include <vector>
 
-#include "core/passes/planes.h"
 #include "core/passes/read_samples.h"
 #include "core/passes/residual.h"
-#include "core/passes/soft_edge.h"
 
 namespace qdmd {
 namespace {
@@ -23,18 +19,7 @@ struct BackgroundRun {
   uint8_t* const rows[3] = {level[0], level[1], level[2]};
 };
 
-// The mask, at least grey where only light differs.
-void mark(const uint8_t* mask, const uint8_t* shaded, size_t count, uint8_t* out) {
-  for (size_t p = 0; p < count; ++p)
-    out[p] = std::max(mask[p], static_cast<uint8_t>(shaded[p] & 127));
-}
-
-// 255 where a mask is not 0.
-void touch(const uint8_t* mask, size_t count, uint8_t* out) {
-  for (size_t p = 0; p < count; ++p) out[p] = mask[p] ? 255 : 0;
-}
-
-// Of a histogram of distances: its bins, and counts of pixels within their limits and beyond.
+// Bins of a histogram of distances, and counts of pixels within their limits and beyond.
 constexpr size_t kBins = kResidualBeyond, kCounts = 2 * kBins;
 
 }  // namespace
@@ -63,8 +48,8 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
                own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
   const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
   const size_t step = std::max<size_t>(1, (runs + kRunsPerFrame - 1) / kRunsPerFrame);
-  // Of each thread, in one frame: pixels within their limits, and those beyond. That is less than a
-  // solve takes, which is over.
+  // What each thread counts in one frame: pixels within their limits, and those beyond. That is
+  // less than a solve takes, which is over.
   static_assert(kRunsPerFrame * kMaxRun < 65536);
   std::vector<uint16_t> of_threads(kCounts * pool.threads());
   for (int i = 0; i < frames; ++i) {
@@ -120,69 +105,6 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
       above += beyond_limits[bin];
   statistics.ratio = total > 0 ? static_cast<double>(above) / static_cast<double>(total) : 0;
   return statistics;
-}
-
-void write_output(const OutputTask& task, const MutableImageView& out, int first_row,
-                  int row_count) {
-  BackgroundRun background;
-  alignas(64) uint8_t made[3][kMaxRun], constant_alpha[kMaxRun], alpha[kMaxRun], touched[kMaxRun];
-  const bool has_alpha = out.alpha && !out.alpha_is_padding;
-  if (out.alpha)
-    std::memset(constant_alpha, out.alpha_is_padding ? 255 : task.constant_alpha, kMaxRun);
-  const auto image_width = static_cast<size_t>(out.width);
-  size_t rows = static_cast<size_t>(row_count), width = image_width;
-  // Rows without gaps are one long row.
-  if (!task.level[0] && out.row_stride == out.pixel_stride * out.width)
-    width *= std::exchange(rows, 1);
-  for (size_t row = 0; row < rows; ++row)
-    for (size_t left = 0; left < width; left += kMaxRun) {
-      const size_t count = std::min(kMaxRun, width - left);
-      const size_t first = static_cast<size_t>(first_row) * image_width + row * width + left;
-      const uint8_t* const x[3] = {task.x[0] + first, task.x[1] + first, task.x[2] + first};
-      const uint8_t* const mask = task.mask ? task.mask + first : nullptr;
-      const uint8_t *channels[3] = {made[0], made[1], made[2]}, *level[3];
-      const auto find_level = [&](const uint8_t* found[3]) {
-        // One long row begins with the first.
-        const size_t y = static_cast<size_t>(first_row) + row;
-        task.find_level(y, left, count, image_width, background.rows, found);
-      };
-      switch (task.output) {
-        case Output::background:
-          find_level(channels);
-          break;
-        case Output::foreground:
-          find_level(level);
-          for (int c = 0; c < kChannels; ++c) absolute_residual(x[c], level[c], count, made[c]);
-          break;
-        case Output::mask:
-          std::fill_n(channels, kChannels, mask);
-          if (task.shaded) {
-            mark(mask, task.shaded + first, count, made[0]);
-            std::fill_n(channels, kChannels, made[0]);
-          }
-          break;
-        case Output::cutout:
-          // Where alpha fades, colours do not: who composites multiplies them.
-          if (task.soft && has_alpha) touch(mask, count, touched);
-          for (int c = 0; c < kChannels; ++c)
-            if (task.soft && !has_alpha)
-              fade(x[c], mask, task.black[c], count, made[c]);
-            else
-              apply_mask(x[c], task.soft ? touched : mask, count, made[c]);
-          break;
-      }
-      const uint8_t* own = constant_alpha;
-      if (task.alpha && !out.alpha_is_padding) own = task.alpha + first;
-      if (task.output == Output::cutout && has_alpha) {
-        if (task.soft)
-          fade(own, mask, 0, count, alpha);
-        else
-          apply_mask(own, mask, count, alpha);
-        own = alpha;
-      }
-      join_channels(channels, own, count, out, first_row + static_cast<int>(row),
-                    static_cast<int>(left));
-    }
 }
 
 }  // namespace qdmd

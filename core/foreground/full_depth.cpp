@@ -17,22 +17,22 @@ void find_units(const Comparison& frame, size_t first, size_t count, uint64_t* u
   uint16_t level[kChannels][kTogether];
   uint16_t* const made[3] = {level[0], level[1], level[2]};
   frame.model->evaluate_deep(first, count, made);
-  const uint8_t* const high[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
-  const uint8_t* const low[3] = {frame.low[0] + first, frame.low[1] + first, frame.low[2] + first};
+  const Samples x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
   const uint16_t* const l[3] = {level[0], level[1], level[2]};
-  squared_units(high, low, frame.model->low_bits(), l, count, units);
+  squared_units(x, frame.model->depth(), l, count, units);
 }
 
 }  // namespace
 
 void full_depth_mask(const Comparison& frame, const uint8_t* const level[3], double threshold,
                      size_t first, size_t count, uint8_t* out) {
-  const uint8_t* const x[3] = {frame.x[0] + first, frame.x[1] + first, frame.x[2] + first};
+  const uint8_t* const x[3] = {frame.x[0].high + first, frame.x[1].high + first,
+                               frame.x[2].high + first};
   if (threshold < kCutLevels)
     std::memset(out, 255, count);
   else
     foreground_mask(x, level, count, threshold - kCutLevels, nullptr, out);
-  const double in_units = threshold * (1 << frame.model->low_bits());
+  const double in_units = threshold * (1 << bits_below(frame.model->depth()));
   const auto most = static_cast<uint64_t>(std::min(in_units * in_units, 1e15));
   for (size_t p = 0; p < count; p += kTogether) {
     const size_t size = std::min(kTogether, count - p);
@@ -44,7 +44,7 @@ void full_depth_mask(const Comparison& frame, const uint8_t* const level[3], dou
 }
 
 void full_depth_distance(const Comparison& frame, size_t first, size_t count, uint16_t* out) {
-  const int shift = 2 * frame.model->low_bits();
+  const int shift = 2 * bits_below(frame.model->depth());
   const uint64_t below = (uint64_t{1} << shift) - 1;
   for (size_t p = 0; p < count; p += kTogether) {
     const size_t size = std::min(kTogether, count - p);

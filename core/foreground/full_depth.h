@@ -12,8 +12,8 @@ namespace qdmd {
 // norms of pixels less than this.
 inline constexpr double kCutLevels = 1.7320508;
 
-// Of a frame with low digits, pixels first .. first + count - 1 of the rows that are kept:
-// 255 where the quaternion norm of x - L exceeds `threshold` levels, else 0. level: L's highest 8
+// Pixels first .. first + count - 1 of the rows that are kept of a frame of more than 8 bits: 255
+// where the quaternion norm of x - L exceeds `threshold` levels, else 0. level: L's highest 8
 // bits there; only pixels that these do not show to be near are compared in full.
 void full_depth_mask(const Comparison& frame, const uint8_t* const level[3], double threshold,
                      size_t first, size_t count, uint8_t* out);

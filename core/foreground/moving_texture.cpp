@@ -75,7 +75,7 @@ void MovingTexture::add(size_t cell, const Sample& sample, double threshold) {
   if (frames_ > 0) count(&cells_[cell].restless, restless);
 }
 
-// Of the pixels that members have found in their own rows.
+// Adds up what members have found in their own rows.
 void MovingTexture::share_counts() {
   if (band_.is_whole()) return;
   std::vector<int64_t> counts;
@@ -153,7 +153,7 @@ bool MovingTexture::moves_now(int row, int col) const {
     return share > static_cast<float>(least) * of;
   };
   const Cell& cell = cells_[static_cast<size_t>(row * grid_.cols + col)];
-  // Of the first frames there is no average yet.
+  // The first frames have no average yet.
   const bool sudden = static_cast<double>(frames_) >= constants_.first_frames &&
                       !above(cell.differing, 1 / constants_.suddenly, cell.now);
   return above(differing, constants_.differing, static_cast<float>(around)) &&

@@ -43,7 +43,7 @@ class MovingTexture {
   bool moves(size_t cell) const { return cells_[cell].moves; }
   // Rows that are looked at: a few of each cell say enough.
   bool samples(int y) const { return y % row_step_ == 0; }
-  // Of such a row in the frame before: a plane's samples.
+  // The samples of a plane in such a row of the frame before.
   const uint8_t* before(int channel, int y) const { return before_.data() + offset(channel, y); }
   // threshold: levels above which pixels differ. From any threads.
   void add(size_t cell, const Sample& sample, double threshold);
@@ -53,7 +53,7 @@ class MovingTexture {
   // Frames that ended.
   int64_t frames() const { return frames_; }
 
-  // Of the frames in which the cell moved, what the newest one counts in means.
+  // What the newest of the frames in which the cell moved counts in means.
   float share(size_t cell) const { return 1 / static_cast<float>(std::max(cells_[cell].moved, 1)); }
 
  private:

@@ -23,7 +23,7 @@ class PixelNoise {
 
   // Begins afresh.
   void forget();
-  // Of a row of pixels.
+  // The noise of a row of pixels.
   uint16_t* row(int y) { return mean_.data() + static_cast<size_t>(y) * width_; }
   // One row in a few of a frame says enough, other rows of each frame.
   bool learns_from(int y) const { return (first_row_ + y + frames_) % kRows == 0; }

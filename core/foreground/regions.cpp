@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/foreground/mask_runs.h"
+#include "core/foreground/parts.h"
 
 namespace qdmd {
 namespace {
@@ -68,27 +69,22 @@ struct Pixels {
 }  // namespace
 
 struct RegionFinder::Memory {
-  // Of rows, from left to right: pixels of which each is at most `reach` right of the one before.
+  // Pixels of a row, from left to right, of which each is at most `reach` right of the one before.
   // If the spans of two are at most `reach` apart, so are two of their pixels: the end of one lies
   // beside the other, or in one of its gaps.
   std::vector<Pixels> stretches;
-  std::vector<size_t> rows;     // where each row's stretches begin
-  std::vector<size_t> part_of;  // another stretch of the same part, itself for one of them
+  std::vector<size_t> rows;   // where each row's stretches begin
+  std::vector<size_t> named;  // by each stretch, another one of its part (parts.h)
   std::vector<Region> regions;
 
   size_t find_part(size_t stretch) {
-    while (part_of[stretch] != stretch) {
-      // Halves the way for the next who asks.
-      part_of[stretch] = part_of[part_of[stretch]];
-      stretch = part_of[stretch];
-    }
-    return stretch;
+    return part_of(stretch, [this](size_t i) -> size_t& { return named[i]; });
   }
   void find_stretches(const uint8_t* mask, const uint8_t* residual, int width, int y, int reach);
   void join_rows(int above, int below, int reach);
 };
 
-// Of row y.
+// Adds those of row y.
 void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* residual, int width,
                                           int y, int reach) {
   const size_t first = stretches.size();
@@ -102,7 +98,7 @@ void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* re
       stretches.back().add(run);
       continue;
     }
-    part_of.push_back(stretches.size());
+    named.push_back(stretches.size());
     stretches.push_back(run);
   }
 }
@@ -113,7 +109,7 @@ void RegionFinder::Memory::join_rows(int above, int below, int reach) {
   while (a < end_of(above) && b < end_of(below)) {
     const Pixels &upper = stretches[a], &lower = stretches[b];
     if (lower.left - upper.right < reach && upper.left - lower.right < reach)
-      part_of[find_part(b)] = find_part(a);
+      named[find_part(b)] = find_part(a);
     // What ends first is near to no other one of the next.
     ++(upper.right < lower.right ? a : b);
   }
@@ -127,8 +123,8 @@ RegionFinder::~RegionFinder() = default;
 const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t* residual,
                                               int width, int height, int least_area) {
   if (!memory_) memory_ = std::make_unique<Memory>();
-  auto& [stretches, rows, part_of, regions] = *memory_;
-  stretches.clear(), rows.clear(), part_of.clear(), regions.clear();
+  auto& [stretches, rows, named, regions] = *memory_;
+  stretches.clear(), rows.clear(), named.clear(), regions.clear();
   const int reach =
       2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
   for (int y = 0; y < height; ++y) {
@@ -146,7 +142,7 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
       least_area > 0 ? least_area : std::max(4.0, static_cast<double>(width) * height / 2000);
   for (size_t k = 0; k < stretches.size(); ++k) {
     const Pixels& part = stretches[k];
-    if (part_of[k] != k || part.area < least) continue;
+    if (named[k] != k || part.area < least) continue;
     regions.push_back({part.left, part.top, part.right - part.left, part.bottom - part.top,
                        part.area, static_cast<double>(part.residual) / part.area});
   }

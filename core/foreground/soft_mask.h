@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/ignored_areas.h"
 #include "core/foreground/decision.h"
-#include "core/foreground/ignored.h"
 #include "core/parallel/pool.h"
 #include "core/passes/soft_edge.h"
 
@@ -29,8 +29,8 @@ class SoftMask {
 
   // The next frame does not come after the one before.
   void forget();
-  // Of the frame that was decided last, whose planes are x. What is ignored stays background. pool:
-  // or null. Results do not depend on it.
+  // Makes that of the frame that was decided last, whose planes are x. What is ignored stays
+  // background. pool: or null. Results do not depend on it.
   void make(const Decision& decision, const uint8_t* const x[3], const SoftEdge& edge,
             const IgnoredAreas& ignored, Pool* pool);
   // 0: background, 255: foreground; width * height samples in row order.
@@ -44,7 +44,7 @@ class SoftMask {
 
   int width_, height_, rows_, cols_;  // pixels; tiles
   int softness_ = 0;                  // of the frame before; 0: none
-  // Of the frame before, until a tile is made anew. Guides and the hard mask
+  // What the frame before had, until a tile is made anew. Guides and the hard mask
   // are known of tiles that had an edge.
   std::vector<uint8_t> alpha_, guide_, white_, had_edge_;
 };

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/foreground/mask_runs.h"
+#include "core/foreground/parts.h"
 
 namespace qdmd {
 namespace {
@@ -26,18 +27,12 @@ uint64_t Specks::bytes(int width, int height) {
          (static_cast<uint64_t>(height) + 1) * sizeof(uint32_t);
 }
 
-uint32_t Specks::part_of(uint32_t run) {
-  while (runs_[run].part != run) {
-    // Halves the way for the next who asks.
-    runs_[run].part = runs_[runs_[run].part].part;
-    run = runs_[run].part;
-  }
-  return run;
-}
-
 bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal) {
   const auto other = static_cast<uint8_t>(~colour);
   const int width = static_cast<int>(width_), corner = diagonal ? 1 : 0;
+  const auto find_part = [this](uint32_t run) {
+    return part_of(run, [this](uint32_t i) -> uint32_t& { return runs_[i].part; });
+  };
   runs_.clear();
   for (size_t y = 0; y < height_; ++y) {
     rows_[y] = static_cast<uint32_t>(runs_.size());
@@ -51,7 +46,7 @@ bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal
       // Runs of the row above that it touches. The last of them may touch the next one, too.
       while (above < rows_[y] && runs_[above].end + corner <= at) ++above;
       for (uint32_t i = above; i < rows_[y] && runs_[i].begin < end + corner; ++i) {
-        const uint32_t a = part_of(i), b = part_of(run);
+        const uint32_t a = find_part(i), b = find_part(run);
         if (a == b) continue;
         runs_[a].area += runs_[b].area;
         runs_[b].part = a;
@@ -62,7 +57,7 @@ bool Specks::take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal
   rows_[height_] = static_cast<uint32_t>(runs_.size());
   for (size_t y = 0; y < height_; ++y)
     for (uint32_t i = rows_[y]; i < rows_[y + 1]; ++i)
-      if (runs_[part_of(i)].area < least)
+      if (runs_[find_part(i)].area < least)
         std::memset(mask + y * width_ + runs_[i].begin, other,
                     static_cast<size_t>(runs_[i].end - runs_[i].begin));
   return true;

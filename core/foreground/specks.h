@@ -21,13 +21,12 @@ class Specks {
   bool take_out(uint8_t* mask, uint8_t colour, size_t least, bool diagonal);
 
  private:
-  // Pixels begin .. end - 1 of a row. Of its part: another run of it, itself where it stands for
-  // all; then the part's pixels.
+  // Pixels begin .. end - 1 of a row. part: another run of its part, itself where it stands for all
+  // (parts.h); the part's pixels are then known of that.
   struct Run {
     int begin, end;
     uint32_t part, area;
   };
-  uint32_t part_of(uint32_t run);
 
   size_t width_, height_, most_runs_;
   std::vector<Run> runs_;

@@ -17,7 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 #if HWY_TARGET == HWY_SCALAR
 size_t sum_pairs(const uint8_t*, const uint8_t*, size_t, uint8_t*, uint8_t*) { return 0; }
 #else
-// Of whole pairs. Returns how many were done.
+// Adds up whole pairs. Returns how many were done.
 size_t sum_pairs(const uint8_t* above, const uint8_t* below, size_t pairs, uint8_t* high,
                  uint8_t* low) {
   const hn::ScalableTag<uint8_t> d;

@@ -32,18 +32,18 @@ size_t part_count(size_t threads, uint64_t pairs, size_t length) {
 }
 
 // Elements of one thread's sums of a call.
-size_t sums_size(int capacity, int digits) {
-  const int planes = kChannels * digits;
+size_t sums_size(int capacity, int planes) {
   return static_cast<size_t>(planes * std::min(kRowSnapshots, capacity)) *
          static_cast<size_t>(planes * capacity);
 }
 
 }  // namespace
 
-uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape, int digits) {
-  const auto cols = static_cast<uint64_t>(kChannels * digits * capacity);
+uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape, int depth) {
+  const int planes = kChannels * sample_bytes(depth);
+  const auto cols = static_cast<uint64_t>(planes * capacity);
   const uint64_t of_thread =
-      sums_size(capacity, digits) * sizeof(int64_t) +
+      sums_size(capacity, planes) * sizeof(int64_t) +
       (shape.is_shared()
            ? SharedChromaProducts::bytes(shape, std::min(kRowSnapshots, capacity), capacity)
            : 0);
@@ -52,25 +52,18 @@ uint64_t SlidingGram::bytes(int capacity, int threads, const ChromaShape& shape,
 }
 
 SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel)
-    : SlidingGram(capacity, pool, kernel, 0) {}
+    : SlidingGram(capacity, {}, 8, pool, kernel) {}
 
-SlidingGram::SlidingGram(int capacity, int low_bits, Pool* pool, const Kernel& kernel)
-    : SlidingGram(capacity, pool, kernel, low_bits) {}
-
-SlidingGram::SlidingGram(int capacity, Pool* pool, const Kernel& kernel, int low_bits)
-    : low_bits_(low_bits), pool_(pool), kernel_(kernel), has_sums_(threads()) {
+SlidingGram::SlidingGram(int capacity, const ChromaShape& shape, int depth, Pool* pool,
+                         const Kernel& kernel)
+    : depth_(depth), pool_(pool), kernel_(kernel), has_sums_(threads()), shape_(shape) {
   const int cols = planes_of_each() * capacity;
   by_slot_ = IntegerMatrix::Zero(cols, cols);
   planes_.reserve(static_cast<size_t>(cols));
-  sums_size_ = sums_size(capacity, planes_of_each() / kChannels);
+  sums_size_ = sums_size(capacity, planes_of_each());
   // Without touching it.
   sums_ = std::make_unique_for_overwrite<int64_t[]>(sums_size_ * has_sums_.size());
-}
-
-SlidingGram::SlidingGram(int capacity, const ChromaShape& shape, Pool* pool, const Kernel& kernel)
-    : SlidingGram(capacity, pool, kernel) {
-  shape_ = shape;
-  for (size_t i = 0; i < threads(); ++i)
+  for (size_t i = 0; shape.is_shared() && i < threads(); ++i)
     shared_.emplace_back(shape, kernel, std::min(kRowSnapshots, capacity), capacity);
 }
 
@@ -93,7 +86,7 @@ void SlidingGram::list_planes(const SnapshotRange& span) {
   planes_.clear();
   for (int t = 0; t < span.size(); ++t) {
     for (int c = 0; c < kChannels; ++c) planes_.push_back(span.plane(t, c));
-    for (int c = 0; low_bits_ > 0 && c < kChannels; ++c) planes_.push_back(span.low_plane(t, c));
+    for (int c = 0; depth_ > 8 && c < kChannels; ++c) planes_.push_back(span.samples(t, c).low);
   }
 }
 
@@ -203,15 +196,15 @@ void SlidingGram::store(const SnapshotRange& span, int start, int end, bool fres
   }
 }
 
-// Of the whole samples of two slots, 3 x 3.
+// The products of the whole samples of two slots, 3 x 3.
 SlidingGram::Block SlidingGram::joined(int row_slot, int col_slot) const {
   const int planes = planes_of_each();
   const auto of = [&](int row_digit, int col_digit) {
     return by_slot_.block<kChannels, kChannels>(planes * row_slot + kChannels * row_digit,
                                                 planes * col_slot + kChannels * col_digit);
   };
-  if (low_bits_ == 0) return of(0, 0);
-  const int64_t unit = int64_t{1} << low_bits_;
+  if (depth_ == 8) return of(0, 0);
+  const int64_t unit = int64_t{1} << bits_below(depth_);
   return of(0, 0) * (unit * unit) + (of(0, 1) + of(1, 0)) * unit + of(1, 1);
 }
 

@@ -7,9 +7,9 @@
 
 #include "core/gram/kernel.h"
 #include "core/gram/shared_chroma.h"
-#include "core/gram/window.h"
 #include "core/parallel/pool.h"
 #include "core/parallel/team.h"
+#include "core/planes/snapshot_range.h"
 #include "core/quaternion/matrix.h"
 
 namespace qdmd {
@@ -27,16 +27,14 @@ class SlidingGram {
   // later need: throws std::bad_alloc.
   explicit SlidingGram(int capacity, Pool* pool = nullptr,
                        const Kernel& kernel = kernels().front());
-  // Of frames whose chroma has shared samples: for add_rows().
-  SlidingGram(int capacity, const ChromaShape& shape, Pool* pool = nullptr,
+  // For snapshots like these planes. If their chroma has shared samples: for add_rows(), of 8 bits.
+  // If samples have more bits, matrix() has the inner products of the whole samples, in units of
+  // their lowest bit. Products of high and low digits are kept apart: four times the products and
+  // the memory.
+  SlidingGram(int capacity, const ChromaShape& shape, int depth, Pool* pool = nullptr,
               const Kernel& kernel = kernels().front());
-  // Of snapshots with so many low bits (SnapshotRange::with_low), 1 to 8: matrix() has the inner
-  // products of the whole samples, in units of their lowest bit. Products of high and low digits
-  // are kept apart: four times the products and the memory. For add_slice().
-  SlidingGram(int capacity, int low_bits, Pool* pool, const Kernel& kernel = kernels().front());
-  // What SlidingGram(capacity, shape) takes with a pool of so many threads; or the one of samples
-  // with so many digits, 1 or 2.
-  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {}, int digits = 1);
+  // The bytes that this takes with a pool of so many threads.
+  static uint64_t bytes(int capacity, int threads, const ChromaShape& shape = {}, int depth = 8);
 
   // Computes the inner products of the newest `count` snapshots of `window` with the newest `span`
   // (count <= span; 0: all), at most 9 span products per pixel and snapshot. Several at once read
@@ -51,14 +49,16 @@ class SlidingGram {
   void add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
     add_slice(span, count, first, length, first == 0);
   }
-  // The same of planes of which another pixel is the first that counts. begins: that slice does.
+  // add_slice() for planes of which another pixel is the first that counts. begins: this slice has
+  // it.
   void add_slice(const SnapshotRange& span, int count, size_t first, size_t length, bool begins);
-  // The same for snapshots of the shape, as far as the pixels of chroma rows first .. first + count
+  // add_slice() for snapshots of the shape, as far as the pixels of chroma rows first .. first +
+  // count
   // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
   void add_rows(const SnapshotRange& span, int frames, int first, int count) {
     add_rows(span, frames, first, count, first == 0);
   }
-  // The same of planes of which another row is the first that counts. begins: that call does.
+  // add_rows() for planes of which another row is the first that counts. begins: this call has it.
   void add_rows(const SnapshotRange& span, int frames, int first, int count, bool begins);
 
   // The matrix in time order, 3 size x 3 size.
@@ -67,10 +67,9 @@ class SlidingGram {
   IntegerMatrix matrix(const SnapshotRange& snapshots, Team* team) const;
 
  private:
-  SlidingGram(int capacity, Pool* pool, const Kernel& kernel, int low_bits);
   size_t threads() const { return pool_ ? pool_->threads() : 1; }
-  // Of a snapshot.
-  int planes_of_each() const { return low_bits_ > 0 ? 2 * kChannels : kChannels; }
+  // The planes of a snapshot.
+  int planes_of_each() const { return sample_bytes(depth_) * kChannels; }
   using Block = Eigen::Matrix<int64_t, kChannels, kChannels>;
   Block joined(int row_slot, int col_slot) const;
   void make_room();
@@ -84,7 +83,7 @@ class SlidingGram {
   // Row k s + c has the products of slot s's plane c, of k = planes_of_each(), with the planes of
   // its time and before. Planes are the channels, then their low digits.
   IntegerMatrix by_slot_;
-  int low_bits_ = 0;
+  int depth_ = 8;
   Pool* pool_ = nullptr;
   Kernel kernel_ = kernels().front();
   std::vector<const uint8_t*> planes_;  // of a call's span, in time order

@@ -90,7 +90,7 @@ void SharedChromaProducts::add(const uint8_t* const* planes, int rows, int cols,
   part.scatter(luma_products_.get(), 1, 1, 0, 0, sums, [](size_t, size_t) { return 1; });
   const int whole = shape_.columns * shape_.rows;
   part.scatter(chroma_products_.get(), 2, 2, 1, 1, sums, [=](size_t, size_t) { return whole; });
-  // Of the high digit and the low one.
+  // What it counts: the high digit and the low one.
   part.scatter(mixed_.get(), 2, 2, 1, 0, sums,
                [](size_t, size_t digit) { return digit == 0 ? 4 : 1; });
   part.scatter(mirrored_.get(), 2, 2, 0, 1, sums,

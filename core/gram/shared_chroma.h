@@ -6,8 +6,9 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/channels.h"
 #include "core/gram/kernel.h"
-#include "core/gram/window.h"
+#include "core/planes/chroma_shape.h"
 
 namespace qdmd {
 
@@ -38,7 +39,7 @@ class SharedChromaProducts {
   ChromaShape shape_;
   Kernel kernel_;
   size_t run_;  // chroma samples that are worked on at once, at most
-  // Of luma, of chroma, and of chroma with the digits of luma both ways round.
+  // Products of luma, of chroma, and of chroma with the digits of luma both ways round.
   Products luma_products_, chroma_products_, mixed_, mirrored_;
   std::unique_ptr<uint8_t[]> digits_;
   std::vector<const uint8_t*> luma_, chroma_, here_, digit_planes_;

@@ -349,7 +349,7 @@ void add_dot_products(const uint8_t* const* rows, size_t row_count, const uint8_
   // Some 200 KiB of stack: there is no allocation that could fail.
   Rows<Arithmetic> packed;
   const size_t steps = length / kStep;
-  // Of the same size, because the last one would otherwise be small and slow.
+  // Blocks have the same size, because the last one would otherwise be small and slow.
   const size_t blocks = (steps * kStep + Arithmetic::kPixels - 1) / Arithmetic::kPixels;
   for (size_t block = 0; block < blocks; ++block)
     for (size_t i = 0; i < row_count; i += kMost) {

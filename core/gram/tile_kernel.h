@@ -7,7 +7,7 @@
 
 namespace qdmd {
 
-// Those that this machine can run, the fastest first. May be empty.
+// The kernels that this machine can run, the fastest first. May be empty.
 std::vector<Kernel> tile_kernels();
 
 }  // namespace qdmd

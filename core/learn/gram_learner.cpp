@@ -18,10 +18,10 @@ constexpr size_t kPixelsPerPart = 16384;
 
 constexpr size_t kUnit = BackgroundModel::kSliceUnit;
 
-// Turns a summary in units of 1 / 2^low_bits levels into one in levels. Sensitivity is a ratio.
-void put_in_levels(int low_bits, DmdSummary* summary) {
-  if (low_bits == 0) return;
-  const double unit = 1.0 / (1 << low_bits);
+// Turns a summary in units of the lowest of so many bits into one in levels. Sensitivity is a ratio.
+void put_in_levels(int depth, DmdSummary* summary) {
+  if (depth == 8) return;
+  const double unit = 1.0 / (1 << bits_below(depth));
   summary->rounding_bound *= unit;
   if (!summary->spectrum) return;
   auto spectrum = *summary->spectrum;
@@ -46,7 +46,7 @@ bool GramLearner::keeps_shared() const {
 }
 
 FrameContents GramLearner::contents() const {
-  if (!keeps_shared()) return {step_, 0, 1, 1, options_.low_bits()};
+  if (!keeps_shared()) return {step_, 0, 1, 1, options_.depth};
   return {step_, 0, options_.chroma_columns, options_.chroma_rows};
 }
 
@@ -57,7 +57,6 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
   const int pictures = options_.method == Method::dmd ? most_channel_pictures(dmd, window_size)
                                                       : most_pictures(dmd, window_size);
   const double seen = pixels_seen();
-  const bool deep = options_.low_bits() > 0;
   const ChromaShape shape =
       step_ == 1 && keeps_shared()
           ? ChromaShape{width_, height_, options_.chroma_columns, options_.chroma_rows}
@@ -68,10 +67,10 @@ uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int th
                                      : decomposition_bytes(dmd, seen, window_size);
   const uint64_t spread = keeps_shared() ? build_spread_bytes(window_size, threads) : 0;
   const bool keeps_pictures = keeps_shared() || models == Models::two_of_live;
-  return SlidingGram::bytes(capacity, threads, shape, deep ? 2 : 1) +
+  return SlidingGram::bytes(capacity, threads, shape, options_.depth) +
          std::max<uint64_t>(decomposition, spread) +
          (models == Models::one ? 1 : 2) *
-             BackgroundModel::bytes(pixels, window_size, pictures, keeps_pictures, deep);
+             BackgroundModel::bytes(pixels, window_size, pictures, keeps_pictures, options_.depth);
 }
 
 bool GramLearner::may_read_frames(int window_size) const {
@@ -117,20 +116,15 @@ void GramLearner::begin(const LearnerRoom& room) {
   room_ = room;
   if (room.models == Models::two_of_live)
     options_.dmd.max_modes = BackgroundModel::most_modes(room.window_size);
-  const int capacity = room.frames->capacity();
-  if (options_.low_bits() > 0)
-    gram_ = SlidingGram(capacity, options_.low_bits(), room.pool);
-  else if (shares_chroma())
-    gram_ = SlidingGram(capacity, room.frames->samples().shape(), room.pool);
-  else
-    gram_ = SlidingGram(capacity, room.pool);
+  const PlaneSlots& samples = room.frames->samples();
+  gram_ = SlidingGram(room.frames->capacity(), samples.shape(), samples.depth(), room.pool);
 }
 
 // What the decomposition sees has samples that pixels share.
 bool GramLearner::shares_chroma() const { return room_.frames->samples().shape().is_shared(); }
 
 SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
-  return room_.frames->whole_samples(snapshots);
+  return snapshots.in(room_.frames->samples());
 }
 
 void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
@@ -173,7 +167,7 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
                               pixels_seen());
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
-    put_in_levels(options_.low_bits(), &decomposed_.dmd);
+    put_in_levels(options_.depth, &decomposed_.dmd);
     background_ = std::move(decomposition.background);
   }
   decomposed_.window_frames = snapshots.size();
@@ -181,16 +175,17 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
   decomposed_.gram_time = products - products_told_;
   decomposed_.solve_time = room_.clock->spent().of(Clock::solving) - before;
   products_told_ = products;
-  snapshots_ = room_.frames->whole(snapshots);
+  snapshots_ = snapshots;
 }
 
 void GramLearner::build(Slice slice, BackgroundModel* model) {
   const Clock::Span span_of_time(*room_.clock, Clock::pictures);
   if (slice.index == 0) {
     built_ = decomposed_;
-    // What is combined directly is read from planes in which each pixel has its samples.
-    const bool keep = snapshots_->shape().is_shared() || room_.models == Models::two_of_live;
-    model->begin(*snapshots_, background_, keep);
+    if (snapshots_->shape().is_shared())
+      model->begin_from(snapshots_->size(), snapshots_->pixels(), background_);
+    else
+      model->begin(*snapshots_, background_, room_.models == Models::two_of_live);
   }
   const size_t first = slice.first(snapshots_->pixels(), kUnit),
                length = slice.size(snapshots_->pixels(), kUnit);

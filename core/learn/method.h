@@ -27,7 +27,6 @@ struct LearnOptions {
   int chroma_columns = 1, chroma_rows = 1;
 
   static constexpr int kMostDepth = 16;
-  int low_bits() const { return depth - 8; }
   // Such samples are kept once.
   bool keeps_shared() const { return chroma_columns > 1; }
   static constexpr int kMaxSampleStep = 64, kMaxIterations = 20;

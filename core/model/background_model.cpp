@@ -10,8 +10,8 @@
 namespace qdmd {
 namespace {
 
-// rows x J to the order that combine_planes reads. With low digits, of that unit, the planes are
-// twice as many.
+// rows x J to the order that combine_planes reads. low: the planes are twice as many, and the
+// second half has digits of that unit.
 template <typename Matrix>
 void group_by_four(const Matrix& rows, bool low, double unit, std::vector<double>* out) {
   const Eigen::Index groups = (rows.rows() + 3) / 4, cols = (low ? 2 : 1) * rows.cols();
@@ -28,13 +28,12 @@ void group_by_four(const Matrix& rows, bool low, double unit, std::vector<double
 
 constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-// Of all models.
-std::atomic<uint64_t> pictures_shown{0};
+std::atomic<uint64_t> pictures_shown{0};  // by all models
 
 }  // namespace
 
 uint64_t BackgroundModel::bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures,
-                                bool deep) {
+                                int depth) {
   // More pictures than this are not made; what is frozen has three.
   const int direct_above = kChannels * snapshots / static_cast<int>(sizeof(float));
   const int made = keep_pictures || pictures <= direct_above ? std::max(pictures, kChannels)
@@ -42,7 +41,8 @@ uint64_t BackgroundModel::bytes(size_t pixels, int snapshots, int pictures, bool
   const auto planes = static_cast<uint64_t>(kChannels) * static_cast<uint64_t>(snapshots);
   // The pictures, their basis twice (as it is, and as combine_planes() reads it), and the planes.
   const uint64_t of_plane = 2 * sizeof(double) * static_cast<uint64_t>(made + 3) + sizeof(uint8_t*);
-  return sizeof(float) * static_cast<uint64_t>(made) * pixels + (deep ? 2 : 1) * planes * of_plane;
+  return sizeof(float) * static_cast<uint64_t>(made) * pixels +
+         static_cast<uint64_t>(sample_bytes(depth)) * planes * of_plane;
 }
 
 void BackgroundModel::make_pictures(size_t count) {
@@ -53,26 +53,38 @@ void BackgroundModel::make_pictures(size_t count) {
 
 void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel& model,
                             bool keep_pictures) {
+  pixels_ = snapshots.pixels();
+  planes_.clear();
+  for (int t = 0; t < snapshots.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
+  for (int t = 0; snapshots.depth() > 8 && t < snapshots.size(); ++t)
+    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.samples(t, c).low);
+  const auto pictures = static_cast<int>(model.basis().rows());
+  begin_with(model, snapshots.size(),
+             !keep_pictures && may_combine_directly(pictures, snapshots.size()));
+}
+
+void BackgroundModel::begin_from(int snapshots, size_t pixels, const TemporalModel& model) {
+  pixels_ = pixels;
+  planes_.clear();
+  begin_with(model, snapshots, false);
+}
+
+void BackgroundModel::begin_with(const TemporalModel& model, int snapshots, bool direct) {
   // Moved, and not assigned: an Eigen matrix that finds no memory for another size is broken.
   model_ = TemporalModel(model);
   basis_ = model.basis();
-  pixels_ = snapshots.pixels();
   largest_ = Eigen::VectorXd(255 * basis_.cwiseAbs().rowwise().sum());
   frozen_ = steady_ = false;
+  direct_ = direct;
   change();
   stride_ = 1;
   gains_.clear();
   limits_.clear();
-  planes_.clear();
-  for (int t = 0; t < snapshots.size(); ++t)
-    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.plane(t, c));
-  snapshot_planes_ = planes_.size();
-  for (int t = 0; snapshots.low_bits() > 0 && t < snapshots.size(); ++t)
-    for (int c = 0; c < kChannels; ++c) planes_.push_back(snapshots.low_plane(t, c));
+  snapshot_planes_ = static_cast<size_t>(kChannels * snapshots);
   const auto pictures = static_cast<size_t>(basis_.rows());
-  direct_ =
-      !keep_pictures && may_combine_directly(static_cast<int>(basis_.rows()), snapshots.size());
-  // Of what freeze_at() makes of them, too. Room for more is made without the old ones beside it.
+  // Room for what freeze_at() makes of them, too. Room for more is made without the old ones beside
+  // it.
   const size_t room = direct_ ? 0 : std::max<size_t>(pictures, kChannels) * pixels_;
   if (samples_.capacity() < room) {
     LargeVector<float>().swap(samples_);
@@ -83,7 +95,8 @@ void BackgroundModel::begin(const SnapshotRange& snapshots, const TemporalModel&
 }
 
 void BackgroundModel::group(const Eigen::MatrixXd& rows) {
-  group_by_four(rows, planes_.size() > snapshot_planes_, 1.0 / (1 << low_bits_), &coefficients_);
+  group_by_four(rows, planes_.size() > snapshot_planes_, 1.0 / (1 << bits_below(depth_)),
+                &coefficients_);
 }
 
 void BackgroundModel::build_slice(size_t first, size_t count) {
@@ -97,7 +110,7 @@ void BackgroundModel::build_from(const uint8_t* const* planes, size_t first, siz
 void BackgroundModel::build_from(const uint16_t* const* planes, size_t first, size_t count) {
   combine_runs(planes, snapshot_planes_, 0, first, count);
   // In levels: a power of two, which rounds nothing.
-  const float unit = 1.0f / static_cast<float>(1 << low_bits_);
+  const float unit = 1.0f / static_cast<float>(1 << bits_below(depth_));
   for (float* picture : pictures_)
     for (size_t p = first; p < first + count; ++p) picture[p] *= unit;
 }
@@ -152,7 +165,7 @@ void BackgroundModel::use_steady_weights(double t) {
   model_.weights(middle / stride_, &steady_weights_);
   // Lazy products take no memory.
   const Eigen::Vector3d moved = (steady_weights_ - time_weights_).cwiseAbs().lazyProduct(largest_);
-  if (moved.maxCoeff() < kSteadyLevels / (1 << low_bits_)) time_weights_ = steady_weights_;
+  if (moved.maxCoeff() < kSteadyLevels / (1 << bits_below(depth_))) time_weights_ = steady_weights_;
 }
 
 void BackgroundModel::set_time(double t) {
@@ -207,7 +220,7 @@ void BackgroundModel::evaluate_with(size_t first, const Evaluate& evaluate, size
 }
 
 void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
-  const auto levels = low_bits_ > 0 ? high_digits_of : levels_of;
+  const auto levels = depth_ > 8 ? high_digits_of : levels_of;
   evaluate_with(
       first,
       [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
@@ -220,19 +233,21 @@ void BackgroundModel::evaluate_deep(size_t first, size_t count, uint16_t* const 
   evaluate_with(
       first,
       [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
-        deep_levels_of(weights, pictures, number, low_bits_, at, count, out);
+        deep_levels_of(weights, pictures, number, depth_, at, count, out);
       },
       count);
 }
 
-void BackgroundModel::evaluate_digits(size_t first, size_t count, uint8_t* const high[3],
-                                      uint8_t* const low[3]) const {
+void BackgroundModel::evaluate(size_t first, size_t count, const MutableSamples out[3]) const {
+  if (depth_ == 8) {
+    uint8_t* const levels[3] = {out[0].high, out[1].high, out[2].high};
+    evaluate(first, count, levels);
+    return;
+  }
   uint16_t samples[kChannels][kMaxRun];
-  uint16_t* const out[3] = {samples[0], samples[1], samples[2]};
-  evaluate_deep(first, count, out);
-  for (size_t c = 0; c < kChannels; ++c)
-    split_digits(reinterpret_cast<const uint8_t*>(samples[c]), sizeof(uint16_t), {8 + low_bits_, 0},
-                 count, high[c], low[c]);
+  uint16_t* const whole[3] = {samples[0], samples[1], samples[2]};
+  evaluate_deep(first, count, whole);
+  for (size_t c = 0; c < kChannels; ++c) split_digits(samples[c], depth_, count, out[c]);
 }
 
 void BackgroundModel::freeze_at(double t) {
@@ -273,20 +288,21 @@ void BackgroundModel::make_room(size_t pixels, bool limits) {
   make_pictures(picture_count());
 }
 
-void BackgroundModel::freeze_as(const std::vector<uint8_t> level[kChannels],
-                                const std::vector<uint8_t> low[kChannels], int low_bits,
-                                const std::vector<uint8_t>* limits, size_t pixels) {
+void BackgroundModel::freeze_as(const OwnedPicture& picture, const std::vector<uint8_t>* limits,
+                                size_t pixels) {
   pixels_ = pixels;
   make_pictures(kChannels);
-  // Nobody knows digits that the picture does not have: the middle of what they can be. Video of 8
+  // Nobody knows bits that the picture does not have: the middle of what they can be. Video of 8
   // bits has the picture's highest ones, as its frames would; other video has it rounded.
-  const bool deep = std::min(low_bits, low_bits_) > 0;
-  const auto unit = 1.0f / static_cast<float>(1 << low_bits);
-  const float middle = low_bits_ == 0 ? 0 : deep ? (low_bits_ > low_bits ? unit / 2 : 0) : 0.5f;
-  for (size_t c = 0; c < kChannels; ++c)
+  const int known = std::min(picture.depth, depth_);
+  const auto unit = 1.0f / static_cast<float>(1 << bits_below(picture.depth));
+  const float middle = depth_ == 8 ? 0 : known == 8 ? 0.5f : depth_ > known ? unit / 2 : 0;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const Samples samples = picture.samples(c);
     for (size_t p = 0; p < pixels; ++p)
-      pictures_[c][p] = static_cast<float>(level[c][p]) + middle +
-                        (deep ? unit * static_cast<float>(low[c][p]) : 0);
+      pictures_[c][p] = static_cast<float>(samples.high[p]) + middle +
+                        (known > 8 ? unit * static_cast<float>(samples.low[p]) : 0);
+  }
   if (limits)
     limits_ = *limits;
   else

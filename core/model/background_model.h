@@ -8,8 +8,9 @@
 #include "core/base/channels.h"
 #include "core/base/large_vector.h"
 #include "core/dmd/temporal_model.h"
-#include "core/gram/window.h"
 #include "core/passes/combine.h"
+#include "core/planes/owned_picture.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd {
 
@@ -18,26 +19,28 @@ namespace qdmd {
 // frames are then combined directly, at 9 m products per pixel.
 class BackgroundModel {
  public:
-  // Of samples with so many bits below their highest eight (SnapshotRange::with_low), 0 to 8: L is
-  // in levels of the highest eight all the same, and evaluate_deep() knows more of it. Before all
-  // others.
-  void set_low_bits(int bits) { low_bits_ = bits; }
-  int low_bits() const { return low_bits_; }
+  // Bits of the frames' samples, 8 to 16: L is in levels of the highest eight all the same, and
+  // evaluate_deep() knows more of it. Before all other calls.
+  void set_depth(int bits) { depth_ = bits; }
+  int depth() const { return depth_; }
 
   // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
   // direct, until the next build.
   void build(const SnapshotRange& snapshots, const TemporalModel& model);
-  // The same in pieces: begin(), then build_slice() for slices that cover each pixel once, by any
+  // build() in pieces: begin(), then build_slice() for slices that cover each pixel once, by any
   // thread, in any order. Slices start at multiples of kSliceUnit pixels.
   // keep_pictures: never combine directly.
   void begin(const SnapshotRange& snapshots, const TemporalModel& model,
              bool keep_pictures = false);
   void build_slice(size_t first, size_t count);
   static constexpr size_t kSliceUnit = 64;
-  // A slice from other samples than the snapshots': planes[j] begins with pixel `first` and can be
-  // read up to the next multiple of 64 samples. Not where the combination is direct.
+  // begin() for build_from(): pictures of modes are made of samples that the caller has, which
+  // stand for so many snapshots. They are never combined directly.
+  void begin_from(int snapshots, size_t pixels, const TemporalModel& model);
+  // A slice of these pictures: planes[j] begins with pixel `first` and can be read up to the next
+  // multiple of 64 samples.
   void build_from(const uint8_t* const* planes, size_t first, size_t count);
-  // The same of whole samples, in units of their lowest bit.
+  // build_from() with whole samples, in units of their lowest bit.
   void build_from(const uint16_t* const* planes, size_t first, size_t count);
   // The snapshots are so many frames apart: 1, until it is set after begin(). Times are in frames.
   void set_stride(int frames) { stride_ = frames; }
@@ -67,7 +70,7 @@ class BackgroundModel {
   // The bytes that a model of a window of `snapshots` takes with up to so many pictures of modes,
   // without limits.
   static uint64_t bytes(size_t pixels, int snapshots, int pictures, bool keep_pictures,
-                        bool deep = false);
+                        int depth = 8);
 
   // True where so many pictures of modes would take more memory than their window.
   static bool may_combine_directly(int pictures, int snapshots) {
@@ -85,19 +88,11 @@ class BackgroundModel {
   // From now on L(t) is this L for every t, times what set_light() may say, and the snapshots are
   // no longer needed.
   void freeze_at(double t);
-  // The same, but the light is at each time what it was.
+  // freeze_at(), but the light is at each time what it was.
   void freeze_but_for_light(double t);
-  // The same with a picture that no window made: planes of `pixels` samples, and limits or null.
-  // low: so many bits below the picture's samples, or 0 bits and empty planes. Throws only where
-  // make_room() was not called before.
-  void freeze_as(const std::vector<uint8_t> level[kChannels],
-                 const std::vector<uint8_t> low[kChannels], int low_bits,
-                 const std::vector<uint8_t>* limits, size_t pixels);
-  void freeze_as(const std::vector<uint8_t> level[kChannels], const std::vector<uint8_t>* limits,
-                 size_t pixels) {
-    const std::vector<uint8_t> none[kChannels];
-    freeze_as(level, none, 0, limits, pixels);
-  }
+  // freeze_at(), with a picture of `pixels` pixels that no window made, and limits or null. Throws
+  // only where make_room() was not called before.
+  void freeze_as(const OwnedPicture& picture, const std::vector<uint8_t>* limits, size_t pixels);
   // Where it throws, all is as it was.
   void make_room(size_t pixels, bool limits);
 
@@ -113,24 +108,26 @@ class BackgroundModel {
   // As long as this is the same, L is, at all pixels; no two models' are the same.
   uint64_t picture() const { return picture_; }
   // L at pixels first .. first + count - 1, rounded to 8 bits and clamped to 0 .. 255, into one
-  // array a channel. count <= kMaxRun. Of samples with low bits its high digit, as frames have it.
+  // array a channel. count <= kMaxRun. If samples have more bits: their highest eight, as frames
+  // have them.
   void evaluate(size_t first, size_t count, uint8_t* const out[3]) const;
-  // The same in units of the lowest bit, rounded.
+  // L in units of the lowest bit, rounded.
   void evaluate_deep(size_t first, size_t count, uint16_t* const out[3]) const;
-  // These as digits. The high ones need not be evaluate()'s, which does not round up to them.
-  void evaluate_digits(size_t first, size_t count, uint8_t* const high[3],
-                       uint8_t* const low[3]) const;
+  // L in all bits, as frames are kept. If there are more than eight, the highest need not be those
+  // of evaluate(), which does not round up to them.
+  void evaluate(size_t first, size_t count, const MutableSamples out[3]) const;
 
  private:
   size_t picture_count() const { return pictures_.size(); }
-  // The same before rounding, at a `first` that is a multiple of kSliceUnit, where the combination
-  // is direct.
+  // L before rounding, at a `first` that is a multiple of kSliceUnit, where the combination is
+  // direct.
   void combine_directly(size_t first, size_t count, float* const* out) const;
   template <typename T>
   void combine_runs(const T* const* planes, size_t plane_count, size_t from, size_t first,
                     size_t count);
   template <typename Evaluate>
   void evaluate_with(size_t first, const Evaluate& evaluate, size_t count) const;
+  void begin_with(const TemporalModel& model, int snapshots, bool direct);
   void make_pictures(size_t count);
   void group(const Eigen::MatrixXd& rows);
   void take_weights(const float* weights, size_t count);
@@ -145,13 +142,13 @@ class BackgroundModel {
   Eigen::VectorXd largest_;            // that a picture has at a pixel, in levels: bounds
   bool direct_ = false, frozen_ = false, steady_ = false;
   uint64_t picture_ = 0;
-  int stride_ = 1, low_bits_ = 0;
-  size_t snapshot_planes_ = 0;  // channels of all snapshots, without low digits
+  int stride_ = 1, depth_ = 8;
+  size_t snapshot_planes_ = 0;  // channels of all snapshots
   size_t pixels_ = 0;
-  // Of the snapshots, in time order; and then their low digits.
+  // The snapshots' highest eight bits, in time order, and then the bits below them.
   std::vector<const uint8_t*> planes_;
-  std::vector<double>
-      coefficients_;            // of the pictures, or of L(t) where direct_, for combine_planes
+  // The pictures' or, where direct_, those of L(t): what combine_planes() is given.
+  std::vector<double> coefficients_;
   LargeVector<float> samples_;  // of the pictures, one after another
   std::vector<float*> pictures_;
   std::vector<float> weights_;  // 3 x K over pictures

@@ -13,13 +13,24 @@ namespace {
 // Pixels of all snapshots that are spread at once: they stay in the second-level cache.
 constexpr size_t kRun = 1024;
 
-// `read(t, channel, first, count, room)` says where samples of snapshot t are: in `room`, which has
-// space for kRun of them, or elsewhere.
-template <typename Sample, typename Read>
-void build_runs(int snapshots, size_t first, size_t count, const Read& read, Pool* pool,
+// Where samples of snapshot t are: in `room`, which has space for kRun of them, or elsewhere.
+const uint8_t* read(const SnapshotRange& snapshots, int t, int channel, size_t first, size_t count,
+                    uint8_t* room) {
+  return read_samples(snapshots, t, channel, first, count, room);
+}
+const uint16_t* read(const SnapshotRange& snapshots, int t, int channel, size_t first, size_t count,
+                     uint16_t* room) {
+  uint8_t spread[2][kRun];
+  join_digits(read_whole_samples(snapshots, t, channel, first, count, {spread[0], spread[1]}),
+              snapshots.depth(), count, room);
+  return room;
+}
+
+template <typename Sample>
+void build_runs(const SnapshotRange& snapshots, size_t first, size_t count, Pool* pool,
                 BackgroundModel* model) {
   constexpr size_t kUnit = BackgroundModel::kSliceUnit;
-  const size_t planes_of_run = kChannels * static_cast<size_t>(snapshots);
+  const size_t planes_of_run = kChannels * static_cast<size_t>(snapshots.size());
   // Taken here: tasks of the pool take no memory.
   const auto room =
       std::make_unique_for_overwrite<Sample[]>(planes_of_run * kRun * pool->threads());
@@ -33,9 +44,9 @@ void build_runs(int snapshots, size_t first, size_t count, const Read& read, Poo
     for (size_t p = begin; p < end; p += kRun) {
       const size_t length = std::min(kRun, end - p);
       Sample* to = room.get() + worker * planes_of_run * kRun;
-      for (int t = 0; t < snapshots; ++t)
+      for (int t = 0; t < snapshots.size(); ++t)
         for (int c = 0; c < kChannels; ++c, to += kRun)
-          of_run[kChannels * t + c] = read(t, c, p, length, to);
+          of_run[kChannels * t + c] = read(snapshots, t, c, p, length, to);
       model->build_from(of_run, p, length);
     }
   });
@@ -50,25 +61,10 @@ uint64_t build_spread_bytes(int snapshots, int threads) {
 
 void build_spread(const SnapshotRange& snapshots, size_t first, size_t count, Pool* pool,
                   BackgroundModel* model) {
-  if (snapshots.low_bits() == 0) {
-    build_runs<uint8_t>(
-        snapshots.size(), first, count,
-        [&](int t, int c, size_t p, size_t length, uint8_t* room) {
-          return read_samples(snapshots, t, c, p, length, room);
-        },
-        pool, model);
-    return;
-  }
-  build_runs<uint16_t>(
-      snapshots.size(), first, count,
-      [&](int t, int c, size_t p, size_t length, uint16_t* room) {
-        uint8_t high[kRun], low[kRun];
-        join_digits(read_samples(snapshots, t, c, p, length, high),
-                    read_low_samples(snapshots, t, c, p, length, low), snapshots.low_bits(), length,
-                    room);
-        return room;
-      },
-      pool, model);
+  if (snapshots.depth() == 8)
+    build_runs<uint8_t>(snapshots, first, count, pool, model);
+  else
+    build_runs<uint16_t>(snapshots, first, count, pool, model);
 }
 
 }  // namespace qdmd

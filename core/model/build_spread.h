@@ -1,14 +1,14 @@
 // A model's pictures from frames whose pixels share samples of chroma.
 #pragma once
 
-#include "core/gram/window.h"
 #include "core/model/background_model.h"
 #include "core/parallel/pool.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd {
 
-// BackgroundModel::build_slice() of such snapshots, whose model was begun with pictures that are
-// kept: samples are spread to pixels a run at a time. Throws std::bad_alloc.
+// BackgroundModel::build_from() with such snapshots, after begin_from(): samples are spread to
+// pixels a run at a time. Throws std::bad_alloc.
 void build_spread(const SnapshotRange& snapshots, size_t first, size_t count, Pool* pool,
                   BackgroundModel* model);
 // The bytes that this takes.

@@ -6,17 +6,15 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/base/colours.h"
+#include "core/planes/owned_picture.h"
 
 namespace qdmd {
 
-// What a pixel's three channels are. Only the caller knows; it decides which videos a background
-// belongs to.
-enum class Colours : uint8_t { rgb, yuv, grey };
-
-// Of method=robust: what a window leaves to the next. Planes have width * height samples.
+// What a window of method=robust leaves to the next. Planes have width * height samples.
 struct LearntEarlier {
   std::vector<uint8_t> level[kChannels], spread;
-  // By the cells of a grid.
+  // What the cells of a grid have.
   int rows = 0, cols = 0;
   std::vector<float> weight, limit;
 };
@@ -28,10 +26,7 @@ struct Learnt {
 
   int width = 0, height = 0;
   Colours colours = Colours::rgb;
-  std::vector<uint8_t> level[kChannels];  // L as it was shown, of more than 8 bits the highest
-  // So many bits below these, 0 to 8; where there are none, the planes are empty.
-  int low_bits = 0;
-  std::vector<uint8_t> low[kChannels];
+  OwnedPicture picture;         // L as it was shown
   std::vector<uint8_t> limits;  // BackgroundModel::limits(), or empty
   double noise = 0;             // ForegroundStatistics::noise
   std::optional<EarlierWindow> earlier;

@@ -20,7 +20,7 @@ constexpr uint64_t kMostPixels = uint64_t{1} << 36;
 
 struct Header {
   uint32_t version = 0, width = 0, height = 0, colours = 0, sections = 0, rows = 0, cols = 0;
-  uint32_t low_bits = 0;
+  uint32_t bits_below = 0;  // those of the picture below its highest eight
   double noise = 0;
   uint64_t bytes = 0;
 
@@ -31,7 +31,7 @@ struct Header {
     uint64_t planes = kChannels;
     if (sections & kHasLimits) planes += 1;
     if (sections & kHasEarlier) planes += kChannels + 1;
-    if (low_bits > 0) planes += kChannels;
+    if (bits_below > 0) planes += kChannels;
     return kLearntHeaderBytes + planes * pixels() + 2 * sizeof(float) * cells() + kChecksumBytes;
   }
 };
@@ -99,7 +99,7 @@ Status damaged(const std::string& what) {
   return bad("it is damaged (" + what + "): save it again, or take another copy.");
 }
 
-// Of a file of so many bytes in all.
+// Reads the header of a file of so many bytes in all.
 Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header) {
   if (bytes.empty()) return bad("it is empty: save it again, or take another copy.");
   const size_t seen = std::min(bytes.size(), kMagic.size());
@@ -109,7 +109,7 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   Reader reader(bytes.subspan(kMagic.size()));
   Header h;
   for (uint32_t* number :
-       {&h.version, &h.width, &h.height, &h.colours, &h.sections, &h.rows, &h.cols, &h.low_bits})
+       {&h.version, &h.width, &h.height, &h.colours, &h.sections, &h.rows, &h.cols, &h.bits_below})
     *number = reader.number<uint32_t>();
   h.noise = std::bit_cast<double>(reader.number<uint64_t>());
   h.bytes = reader.number<uint64_t>();
@@ -118,7 +118,7 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
                " of the format, and this qdmdbackground reads versions 1 to " +
                std::to_string(kLearntVersion) + ": save it again with this one.");
   constexpr uint32_t kMost = std::numeric_limits<int32_t>::max();
-  const uint32_t most_low_bits = h.version == 1 ? 0 : 8;
+  const uint32_t most_below = h.version == 1 ? 0 : 8;
   // Cells are no smaller than pixels.
   const bool grid = h.sections & kHasEarlier
                         ? h.rows > 0 && h.cols > 0 && h.rows <= h.height && h.cols <= h.width
@@ -126,7 +126,7 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   const bool sane = h.width > 0 && h.height > 0 && h.width <= kMost && h.height <= kMost &&
                     h.pixels() <= kMostPixels &&
                     h.colours <= static_cast<uint32_t>(Colours::grey) &&
-                    (h.sections & ~kAllSections) == 0 && grid && h.low_bits <= most_low_bits &&
+                    (h.sections & ~kAllSections) == 0 && grid && h.bits_below <= most_below &&
                     std::isfinite(h.noise) && h.noise >= 0;
   if (!sane || h.bytes != h.bytes_of_all()) return damaged("its first bytes make no sense");
   if (h.bytes != all)
@@ -147,7 +147,7 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
   Header header;
   header.width = static_cast<uint32_t>(learnt.width);
   header.height = static_cast<uint32_t>(learnt.height);
-  header.low_bits = static_cast<uint32_t>(learnt.low_bits);
+  header.bits_below = static_cast<uint32_t>(bits_below(learnt.picture.depth));
   if (!learnt.limits.empty()) header.sections |= kHasLimits;
   if (learnt.earlier) {
     header.sections |= kHasEarlier;
@@ -159,11 +159,11 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
   writer.put_plane(kMagic);
   for (uint32_t number :
        {kLearntVersion, header.width, header.height, static_cast<uint32_t>(learnt.colours),
-        header.sections, header.rows, header.cols, header.low_bits})
+        header.sections, header.rows, header.cols, header.bits_below})
     writer.put(number);
   writer.put(std::bit_cast<uint64_t>(learnt.noise));
   writer.put(bytes);
-  for (const auto& level : learnt.level) writer.put_plane(level);
+  for (const auto& level : learnt.picture.level) writer.put_plane(level);
   writer.put_plane(learnt.limits);
   if (learnt.earlier) {
     for (const auto& level : learnt.earlier->level) writer.put_plane(level);
@@ -171,7 +171,7 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
     writer.put_numbers(learnt.earlier->weight);
     writer.put_numbers(learnt.earlier->limit);
   }
-  for (const auto& low : learnt.low) writer.put_plane(low);
+  for (const auto& below : learnt.picture.below) writer.put_plane(below);
   writer.put(checksum(writer.bytes()));
   return writer.take();
 }
@@ -195,7 +195,7 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
   read.height = static_cast<int>(header.height);
   read.colours = static_cast<Colours>(header.colours);
   read.noise = header.noise;
-  for (auto& level : read.level) level = reader.plane(pixels);
+  for (auto& level : read.picture.level) level = reader.plane(pixels);
   if (header.sections & kHasLimits) read.limits = reader.plane(pixels);
   if (header.sections & kHasEarlier) {
     Learnt::EarlierWindow& earlier = read.earlier.emplace();
@@ -208,11 +208,11 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
     if (!are_weights(earlier.weight) || !are_weights(earlier.limit))
       return damaged("it has numbers that are none");
   }
-  read.low_bits = static_cast<int>(header.low_bits);
-  for (auto& low : read.low) {
-    low = reader.plane(read.low_bits > 0 ? pixels : 0);
-    const auto fits = [&](uint8_t digit) { return digit >> read.low_bits == 0; };
-    if (!std::all_of(low.begin(), low.end(), fits))
+  read.picture.depth = 8 + static_cast<int>(header.bits_below);
+  for (auto& below : read.picture.below) {
+    below = reader.plane(header.bits_below > 0 ? pixels : 0);
+    const auto fits = [&](uint8_t bits) { return bits >> header.bits_below == 0; };
+    if (!std::all_of(below.begin(), below.end(), fits))
       return damaged("it has more bits in a sample than it says");
   }
   *learnt = std::move(read);

@@ -13,8 +13,8 @@ namespace qdmd {
 struct Slice {
   int index = 0, count = 1;
 
-  // Of `length` samples: where the part begins and how long it is. Parts begin at multiples of
-  // `unit`, as equal as that allows.
+  // The part of `length` samples: where the part begins and how long it is. Parts begin at
+  // multiples of `unit`, as equal as that allows.
   size_t first(size_t length, size_t unit) const { return boundary(index, length, unit); }
   size_t size(size_t length, size_t unit) const {
     return boundary(index + 1, length, unit) - boundary(index, length, unit);
@@ -44,8 +44,8 @@ inline constexpr size_t kWorthAThread = 16384;
 // Whether several threads are worth it for so many pixels in all.
 inline bool is_shared_out(size_t pixels) { return pixels >= 2 * kWorthAThread; }
 
-// The same for `pixels` pixels in all, on as many threads as that is worth; on the caller's where
-// the pool is null. band(first, size).
+// for_bands() for `pixels` pixels in all, on as many threads as that is worth; on the caller's
+// where the pool is null. band(first, size).
 template <typename Band>
 void for_rows(Pool* pool, int length, size_t pixels, Band band) {
   const auto most = static_cast<size_t>(std::max(length, 1));

@@ -36,7 +36,7 @@ HWY_INLINE hn::Vec<D> load_first(D d, const uint8_t* from) {
   }
 }
 
-// The same samples; reads up to kStride - 1 bytes before the first.
+// load_first(), but it reads up to kStride - 1 bytes before the first.
 template <size_t kStride, class D>
 HWY_INLINE hn::Vec<D> load_last(D d, const uint8_t* from) {
   if constexpr (kStride == 1) {
@@ -118,7 +118,7 @@ HWY_INLINE void mean_vector(D d, const uint8_t* above, const uint8_t* below, uin
   hn::StoreU(hn::DemoteTo(half, hn::BitCast(d16s, sum)), half, out);
 }
 
-// Of `pairs` whole pairs. Returns how many were done: all, or none.
+// The means of `pairs` whole pairs. Returns how many were done: all, or none.
 template <bool kTwoRows, class D>
 HWY_INLINE size_t mean_vectors(D d, const uint8_t* above, const uint8_t* below, size_t pairs,
                                uint8_t* out) {

@@ -82,7 +82,7 @@ size_t level_vectors(const float* weights, const float* const* pictures, size_t 
   };
   (void)scale;
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
-    // Of bytes the bias comes first, it is one step less.
+    // With bytes the bias comes first: it is one step less.
     auto r = sizeof(T) > 1 ? zero : bias, g = r, b = r;
     for (size_t k = 0; k < picture_count; ++k) {
       const float* from = pictures[k] + first + p;
@@ -184,8 +184,8 @@ void levels(const float* weights, const float* const* pictures, size_t picture_c
   all_levels(weights, pictures, picture_count, {1, bias, 255}, first, count, out);
 }
 void deep_levels(const float* weights, const float* const* pictures, size_t picture_count,
-                 int low_bits, size_t first, size_t count, uint16_t* const* out) {
-  const auto scale = static_cast<float>(1 << low_bits);
+                 int depth, size_t first, size_t count, uint16_t* const* out) {
+  const auto scale = static_cast<float>(1 << (depth - 8));
   all_levels(weights, pictures, picture_count, {scale, 0.5f, 256 * scale - 1}, first, count, out);
 }
 
@@ -230,9 +230,9 @@ void high_digits_of(const float* weights, const float* const* pictures, size_t p
 }
 
 void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
-                    int low_bits, size_t first, size_t count, uint16_t* const out[3]) {
+                    int depth, size_t first, size_t count, uint16_t* const out[3]) {
   HWY_DYNAMIC_DISPATCH(deep_levels)
-  (weights, pictures, picture_count, low_bits, first, count, out);
+  (weights, pictures, picture_count, depth, first, count, out);
 }
 
 void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples) {

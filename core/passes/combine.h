@@ -17,7 +17,7 @@ constexpr size_t kMaxRun = 1024;
 // next multiple of 64 behind the last pixel.
 void combine_planes(const double* coefficients, size_t sum_count, const uint8_t* const* planes,
                     size_t plane_count, size_t first, size_t count, float* const* sums);
-// The same of samples of 16 bits.
+// combine_planes() for samples of 16 bits.
 void combine_planes(const double* coefficients, size_t sum_count, const uint16_t* const* planes,
                     size_t plane_count, size_t first, size_t count, float* const* sums);
 
@@ -26,12 +26,13 @@ void combine_planes(const double* coefficients, size_t sum_count, const uint16_t
 // 0 .. 255; not-a-number gives 0.
 void levels_of(const float* weights, const float* const* pictures, size_t picture_count,
                size_t first, size_t count, uint8_t* const out[3]);
-// The same rounded down.
+// levels_of(), but rounded down.
 void high_digits_of(const float* weights, const float* const* pictures, size_t picture_count,
                     size_t first, size_t count, uint8_t* const out[3]);
-// The same times 2^low_bits, rounded to nearest and clamped to what 8 + low_bits bits hold.
+// levels_of() in units of the lowest of `depth` bits, of which a level is the eighth from above:
+// rounded to nearest and clamped to what they hold.
 void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
-                    int low_bits, size_t first, size_t count, uint16_t* const out[3]);
+                    int depth, size_t first, size_t count, uint16_t* const out[3]);
 
 // Pictures of `count` samples, one after another, become the three that the 3 x picture_count
 // weights make of them, before rounding: these take the places of the first three, for which there

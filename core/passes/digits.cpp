@@ -5,6 +5,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include "core/passes/chroma.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/passes/digits.cpp"
 #include "core/passes/simd.h"
@@ -203,19 +205,43 @@ HWY_EXPORT(fade_row);
 }  // namespace
 
 void split_digits(const uint8_t* from, ptrdiff_t stride, SampleBits bits, size_t count,
-                  uint8_t* high, uint8_t* low) {
+                  MutableSamples to) {
   if (stride == 2 || stride == 4 || stride == 8) {
     HWY_DYNAMIC_DISPATCH(split_row)
-    (from, static_cast<size_t>(stride), bits.shift, bits.low(), count, high, low);
+    (from, static_cast<size_t>(stride), bits.shift, bits.low(), count, to.high, to.low);
     return;
   }
   for (size_t p = 0; p < count; ++p) HWY_DYNAMIC_DISPATCH(split_row)
-  (from + static_cast<ptrdiff_t>(p) * stride, 2, bits.shift, bits.low(), 1, high + p, low + p);
+  (from + static_cast<ptrdiff_t>(p) * stride, 2, bits.shift, bits.low(), 1, to.high + p,
+   to.low + p);
 }
 
-void join_digits(const uint8_t* high, const uint8_t* low, int low_bits, size_t count,
-                 uint16_t* out) {
-  HWY_DYNAMIC_DISPATCH(join_row)(high, low, low_bits, count, out);
+void split_digits(const uint16_t* from, int depth, size_t count, MutableSamples to) {
+  split_digits(reinterpret_cast<const uint8_t*>(from), sizeof(uint16_t), {depth, 0}, count, to);
+}
+
+void join_digits(Samples from, int depth, size_t count, uint16_t* out) {
+  HWY_DYNAMIC_DISPATCH(join_row)(from.high, from.low, bits_below(depth), count, out);
+}
+
+void take_row(const uint8_t* from, const Spacing& at, SampleBits bits, size_t count, uint8_t* room,
+              MutableSamples to) {
+  const auto columns = static_cast<size_t>(at.columns);
+  if (!bits.is_deep()) {
+    spread_samples(from, at.pixel_stride, at.columns, count, to.high);
+  } else if (columns == 1) {
+    split_digits(from, at.pixel_stride, bits, count, to);
+  } else {
+    const MutableSamples shared(room, room + count);
+    split_digits(from, at.pixel_stride, bits, (count + columns - 1) / columns, shared);
+    spread_samples(shared.high, 1, at.columns, count, to.high);
+    spread_samples(shared.low, 1, at.columns, count, to.low);
+  }
+}
+
+bool are_all(Samples samples, Samples value, size_t count) {
+  return are_all(samples.high, *value.high, count) &&
+         (!samples.low || are_all(samples.low, *value.low, count));
 }
 
 void put_words(const uint16_t* samples, SampleBits bits, size_t count, uint8_t* to,
@@ -259,9 +285,11 @@ void fade(const uint16_t* x, const uint8_t* alpha, uint16_t black, size_t count,
   HWY_DYNAMIC_DISPATCH(fade_row)(x, alpha, black, count, out);
 }
 
-void squared_units(const uint8_t* const high[3], const uint8_t* const low[3], int low_bits,
-                   const uint16_t* const l[3], size_t count, uint64_t* out) {
-  HWY_DYNAMIC_DISPATCH(squared_units)(high, low, low_bits, l, count, out);
+void squared_units(const Samples x[3], int depth, const uint16_t* const l[3], size_t count,
+                   uint64_t* out) {
+  const uint8_t* const high[3] = {x[0].high, x[1].high, x[2].high};
+  const uint8_t* const low[3] = {x[0].low, x[1].low, x[2].low};
+  HWY_DYNAMIC_DISPATCH(squared_units)(high, low, bits_below(depth), l, count, out);
 }
 
 }  // namespace qdmd

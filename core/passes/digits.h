@@ -6,30 +6,40 @@
 #include <cstdint>
 
 #include "core/base/image_view.h"
+#include "core/planes/samples.h"
 
 namespace qdmd {
 
-// The high digit of a sample is its highest 8 bits, the low digit the `bits.low()` bits below them.
-// Distances between words are in bytes. 8-bit samples have no digits: bits.is_deep().
+// The high digit of a sample is its highest 8 bits, the low digit the bits below them. Distances
+// between words are in bytes. 8-bit samples have no digits: depths here are 9 to 16.
 
-// high[p], low[p] = the digits of the word at from + p * stride, p < count. Reads nothing behind
-// the last word.
+// to[p] = the digits of the word at from + p * stride, p < count. Reads nothing behind the last
+// word.
 void split_digits(const uint8_t* from, ptrdiff_t stride, SampleBits bits, size_t count,
-                  uint8_t* high, uint8_t* low);
-// out[p] = high[p] 2^low_bits + low[p].
-void join_digits(const uint8_t* high, const uint8_t* low, int low_bits, size_t count,
-                 uint16_t* out);
+                  MutableSamples to);
+// to[p] = the digits of from[p].
+void split_digits(const uint16_t* from, int depth, size_t count, MutableSamples to);
+// out[p] = from[p], of both digits.
+void join_digits(Samples from, int depth, size_t count, uint16_t* out);
 // The words at to + p * stride become the samples.
 void put_words(const uint16_t* samples, SampleBits bits, size_t count, uint8_t* to,
                ptrdiff_t stride);
-// The same of words that lie side by side, in pairs or in fours.
+// put_words() for words that lie side by side, in pairs or in fours.
 void put_pairs(const uint16_t* const samples[2], SampleBits bits, size_t count, uint8_t* to);
 void put_fours(const uint16_t* const samples[4], SampleBits bits, size_t count, uint8_t* to);
 
-// out[p] = the squared quaternion norm of x[p] - l[p] in units of the lowest bit. high, low: x's
-// digits, R, G, B; l: whole samples.
-void squared_units(const uint8_t* const high[3], const uint8_t* const low[3], int low_bits,
-                   const uint16_t* const l[3], size_t count, uint64_t* out);
+// Samples of any depth, 8 included: to[p] = the one of pixel p of a row that begins at `from` and
+// lies as `at` says, p < count. room: of 2 count bytes, where there are more than 8 bits and pixels
+// of a row share samples; else it may be null.
+void take_row(const uint8_t* from, const Spacing& at, SampleBits bits, size_t count, uint8_t* room,
+              MutableSamples to);
+// Whether all samples are value[0], of any depth.
+bool are_all(Samples samples, Samples value, size_t count);
+
+// out[p] = the squared quaternion norm of x[p] - l[p] in units of the lowest bit. R, G, B; l: whole
+// samples.
+void squared_units(const Samples x[3], int depth, const uint16_t* const l[3], size_t count,
+                   uint64_t* out);
 
 // What core/passes/chroma.h and soft_edge.h have for bytes.
 

@@ -73,7 +73,7 @@ void smoothed(const uint8_t* const* x, const uint8_t* const* l, size_t count,
         sums[p] += sum * sum;
       }
     }
-    // Of the means, rounded to the nearest.
+    // Sums become the means, rounded to the nearest.
     for (size_t p = 0; p < size; ++p) {
       const float squared = sums[p] * (1.0f / 81) + 0.5f;
       out[first + p] = static_cast<uint16_t>(squared < 65535 ? static_cast<int>(squared) : 65535);

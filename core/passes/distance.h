@@ -20,7 +20,7 @@ void squared_distance(const uint8_t* const x[3], const uint8_t* const l[3], size
 void nearest_distance(const uint8_t* const x[3], const uint8_t* const* rows, size_t count, int step,
                       uint16_t* out);
 
-// The same as squared_distance() of the means over 3 x 3 pixels. x[3 * c + i], l: channel c of row
+// squared_distance() of the means over 3 x 3 pixels. x[3 * c + i], l: channel c of row
 // i - 1, with one sample more on both sides.
 void smoothed_distance(const uint8_t* const* x, const uint8_t* const* l, size_t count,
                        uint16_t* out);

@@ -23,7 +23,7 @@ struct EvenOdd {
     return hn::And(hn::BitCast(Words(), x), hn::Set(Words(), uint16_t{255}));
   }
   static HWY_INLINE V16 odd(V8 x) { return hn::ShiftRight<8>(hn::BitCast(Words(), x)); }
-  // Of sums up to 255.
+  // Bytes of sums up to 255.
   static HWY_INLINE V8 joined(V16 even, V16 odd) {
     return hn::BitCast(Bytes(), hn::Or(even, hn::ShiftLeft<8>(odd)));
   }

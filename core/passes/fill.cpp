@@ -47,7 +47,7 @@ void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep
   for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor) & keep[i];
 }
 
-// The same of whole samples, whose digits are high and low. next_high, next_low: as above.
+// take_row() for whole samples, whose digits are high and low. next_high, next_low: as above.
 void take_deep_row(const uint8_t* HWY_RESTRICT high, const uint8_t* HWY_RESTRICT low,
                    const uint8_t* HWY_RESTRICT keep, int low_bits, size_t count, float factor,
                    const uint8_t* next_high, const uint8_t* next_low, uint16_t* HWY_RESTRICT out) {
@@ -235,135 +235,114 @@ HWY_EXPORT(fill_rows);
 HWY_EXPORT(fill_deep_rows);
 
 constexpr size_t kUnit = 64;
-// Of samples and what is kept of them.
+// The bytes of a run's samples, and of what is kept of them.
 constexpr size_t kRunBytes = size_t{1} << 19;
 
 size_t round_up(size_t count) { return (count + kUnit - 1) / kUnit * kUnit; }
 
 // Pixels of a run.
-size_t run_of(int snapshots, bool deep) {
+template <typename Sample>
+size_t run_of(int snapshots) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1));
-  const size_t of_pixel = m * (kChannels * (deep ? 2 : 1) + 1);
+  const size_t of_pixel = m * (kChannels * sizeof(Sample) + 1);
   // An odd number of cache lines: those of all snapshots at a pixel are then in different sets.
   const size_t units = std::clamp<size_t>(kRunBytes / of_pixel / kUnit, 1, 4096 / kUnit);
   return (units - 1) / 2 * 2 * kUnit + kUnit;
 }
 
-// Of a run. Vectors of bits are read whole, also at the end.
+// Bytes for the bits of a run's mask. Vectors of bits are read whole, also at the end.
 size_t bits_size(size_t run) { return run / 8 + kUnit; }
 
 }  // namespace
 
-uint64_t Filler::bytes(int snapshots, bool deep) {
+template <typename Sample>
+uint64_t Filler<Sample>::bytes(int snapshots) {
   const auto m = static_cast<uint64_t>(std::max(snapshots, 1));
-  const uint64_t run = run_of(snapshots, deep), size = deep ? 2 : 1;
+  const uint64_t run = run_of<Sample>(snapshots), size = sizeof(Sample);
   return (m + size * (m * kChannels + 1) + sizeof(uint16_t) + size) * run + bits_size(run) +
-         m * kChannels * sizeof(uint8_t*);
+         m * kChannels * sizeof(Sample*);
 }
 
-Filler::Filler(int snapshots, bool deep) : run_(run_of(snapshots, deep)) {
-  const auto m = static_cast<size_t>(std::max(snapshots, 1));
+template <typename Sample>
+Filler<Sample>::Filler(int snapshots) : run_(run_of<Sample>(snapshots)) {
+  const auto m = static_cast<size_t>(std::max(snapshots, 1)), planes = m * kChannels;
   keep_.resize(m * run_);
   masked_.resize(run_);
-  spread_.resize((deep ? 2 : 1) * run_);
+  spread_.resize(sizeof(Sample) * run_);
   bits_.resize(bits_size(run_));
   // One row more for the level.
-  if (deep)
-    list_rows(m * kChannels, &deep_samples_, &deep_planes_);
-  else
-    list_rows(m * kChannels, &samples_, &planes_);
+  samples_.resize((planes + 1) * run_);
+  planes_.reserve(planes);
+  for (size_t k = 0; k < planes; ++k) planes_.push_back(samples_.data() + k * run_);
 }
 
-template <typename T>
-void Filler::list_rows(size_t planes, std::vector<T>* samples, std::vector<const T*>* rows) {
-  samples->resize((planes + 1) * run_);
-  rows->reserve(planes);
-  for (size_t k = 0; k < planes; ++k) rows->push_back(samples->data() + k * run_);
-}
-
-// Calls take(snapshot, the next one, keep, channel, factor, row) for each channel of each snapshot.
-template <typename Take>
-void Filler::take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                       const WindowMask& mask, size_t first, size_t padded, const Take& take) {
+// What is kept of each snapshot, in unit light.
+template <typename Sample>
+void Filler<Sample>::take_rows(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
+                               const WindowMask& mask, size_t first, size_t count) {
   const auto m = static_cast<size_t>(snapshots.size());
+  const size_t padded = round_up(count);
   std::fill_n(masked_.data(), padded, uint16_t{0});
   for (size_t t = 0; t < m; ++t) {
     uint8_t* keep = keep_.data() + t * run_;
     const int snapshot = static_cast<int>(t), next = std::min(snapshot + 1, snapshots.size() - 1);
     mask.read(snapshot, first, padded, bits_.data());
     HWY_DYNAMIC_DISPATCH(expand_bits)(bits_.data(), padded, keep, masked_.data());
-    for (size_t c = 0; c < kChannels; ++c) {
-      const float gain = gains[t][c];
-      take(snapshot, next, keep, static_cast<int>(c), gain == 1 ? 1 : 1 / gain,
-           (kChannels * t + c) * run_);
+    for (int c = 0; c < kChannels; ++c) {
+      const auto channel = static_cast<size_t>(c);
+      const float gain = gains[t][channel], factor = gain == 1 ? 1 : 1 / gain;
+      Sample* const to = samples_.data() + (kChannels * t + channel) * run_;
+      // Planes are padded like runs.
+      const bool own = c == 0 || !snapshots.shape().is_shared();
+      if constexpr (sizeof(Sample) == 1) {
+        const uint8_t* const from =
+            read_samples(snapshots, snapshot, c, first, count, spread_.data());
+        HWY_DYNAMIC_DISPATCH(take_row)
+        (from, keep, padded, factor, own ? snapshots.plane(next, c) + first : from, to);
+      } else {
+        const Samples from = read_whole_samples(snapshots, snapshot, c, first, count,
+                                                {spread_.data(), spread_.data() + run_});
+        const Samples then = own ? snapshots.samples(next, c) + first : from;
+        HWY_DYNAMIC_DISPATCH(take_deep_row)
+        (from.high, from.low, keep, bits_below(snapshots.depth()), padded, factor, then.high,
+         then.low, to);
+      }
     }
   }
 }
 
-const uint8_t* const* Filler::fill(const SnapshotRange& snapshots, const std::vector<Gain>& gains,
-                                   const WindowMask& mask, const ReferencePicture& reference,
-                                   const uint8_t* reach, size_t first, size_t count) {
+template <typename Sample>
+const Sample* const* Filler<Sample>::fill(const SnapshotRange& snapshots,
+                                          const std::vector<Gain>& gains, const WindowMask& mask,
+                                          const ReferencePicture& reference, const uint8_t* reach,
+                                          size_t first, size_t count) {
   const auto m = static_cast<size_t>(snapshots.size());
   const size_t padded = round_up(count);
-  take_rows(snapshots, gains, mask, first, padded,
-            [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
-              const bool own = channel == 0 || !snapshots.shape().is_shared();
-              const uint8_t* from = snapshots.plane(t, channel) + first;
-              if (!own) from = read_samples(snapshots, t, channel, first, count, spread_.data());
-              // Planes are padded like runs.
-              HWY_DYNAMIC_DISPATCH(take_row)
-              (from, keep, padded, factor, own ? snapshots.plane(next, channel) + first : from,
-               samples_.data() + row);
-            });
-  uint8_t* level = samples_.data() + m * kChannels * run_;
+  take_rows(snapshots, gains, mask, first, count);
+  Sample* const level = samples_.data() + m * kChannels * run_;
+  const uint8_t* const most = reach ? reach + first : nullptr;
   for (size_t c = 0; c < kChannels; ++c) {
-    std::memcpy(level, reference.level[c].data() + first, count);
-    std::memset(level + count, 0, padded - count);
-    HWY_DYNAMIC_DISPATCH(fill_rows)
-    (samples_.data() + c * run_, kChannels * run_, m, keep_.data(), run_, masked_.data(),
-     reach ? reach + first : nullptr, padded, level);
+    const uint8_t* const known = reference.level[c].data() + first;
+    Sample* const rows = samples_.data() + c * run_;
+    std::fill(level + count, level + padded, Sample{0});
+    if constexpr (sizeof(Sample) == 1) {
+      std::copy_n(known, count, level);
+      HWY_DYNAMIC_DISPATCH(fill_rows)
+      (rows, kChannels * run_, m, keep_.data(), run_, masked_.data(), most, padded, level);
+    } else {
+      const int shift = bits_below(snapshots.depth());
+      // The middle of what has these highest eight bits.
+      for (size_t p = 0; p < count; ++p)
+        level[p] = static_cast<uint16_t>((2 * known[p] + 1) << shift >> 1);
+      HWY_DYNAMIC_DISPATCH(fill_deep_rows)
+      (rows, kChannels * run_, m, keep_.data(), run_, masked_.data(), most, shift, padded, level);
+    }
   }
   return planes_.data();
 }
 
-const uint16_t* const* Filler::fill_deep(const SnapshotRange& snapshots,
-                                         const std::vector<Gain>& gains, const WindowMask& mask,
-                                         const ReferencePicture& reference, const uint8_t* reach,
-                                         size_t first, size_t count) {
-  const auto m = static_cast<size_t>(snapshots.size());
-  const size_t padded = round_up(count);
-  const int low_bits = snapshots.low_bits();
-  take_rows(snapshots, gains, mask, first, padded,
-            [&](int t, int next, const uint8_t* keep, int channel, float factor, size_t row) {
-              const bool own = channel == 0 || !snapshots.shape().is_shared();
-              const uint8_t* high = snapshots.plane(t, channel) + first;
-              const uint8_t* low = snapshots.low_plane(t, channel) + first;
-              if (!own) {
-                high = read_samples(snapshots, t, channel, first, count, spread_.data());
-                low = read_low_samples(snapshots, t, channel, first, count, spread_.data() + run_);
-              }
-              HWY_DYNAMIC_DISPATCH(take_deep_row)
-              (high, low, keep, low_bits, padded, factor,
-               own ? snapshots.plane(next, channel) + first : high,
-               own ? snapshots.low_plane(next, channel) + first : low, deep_samples_.data() + row);
-            });
-  uint16_t* level = deep_samples_.data() + m * kChannels * run_;
-  for (size_t c = 0; c < kChannels; ++c) {
-    // The middle of what has this high digit.
-    for (size_t p = 0; p < count; ++p)
-      level[p] = static_cast<uint16_t>((2 * reference.level[c][first + p] + 1) << low_bits >> 1);
-    std::fill(level + count, level + padded, uint16_t{0});
-    HWY_DYNAMIC_DISPATCH(fill_deep_rows)
-    (deep_samples_.data() + c * run_, kChannels * run_, m, keep_.data(), run_, masked_.data(),
-     reach ? reach + first : nullptr, low_bits, padded, level);
-  }
-  return deep_planes_.data();
-}
-
-void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const uint8_t* const x[3],
-                  const Gain& gain, const uint8_t* reach, int step, uint8_t* const out[3]) {
-  fill_samples(reference, bits, x, gain, reach, {0, reference.height, step}, out);
-}
+template class Filler<uint8_t>;
+template class Filler<uint16_t>;
 
 void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
                   const Gain& gain, const uint8_t* reach, const SampledRows& rows,

@@ -37,8 +37,8 @@ void sum_columns(const uint8_t* samples, size_t stride, size_t rows, size_t coun
   }
 }
 
-// The same of the rows of pixels that share these samples: `shared` rows each, of the first and the
-// last one so many less.
+// Makes these the sums of the rows of pixels that share the samples: `shared` rows each, of the
+// first and the last one so many less.
 void weigh_columns(const uint8_t* first, uint32_t less_first, const uint8_t* last,
                    uint32_t less_last, uint32_t shared, size_t count, uint32_t* HWY_RESTRICT sums) {
   for (size_t x = 0; x < count; ++x)
@@ -58,7 +58,7 @@ void add_few(const uint32_t* HWY_RESTRICT sums, const uint32_t* HWY_RESTRICT beg
   }
 }
 
-// The same of `least` columns. Cells of small pictures have a few, for which a loop of its own
+// add_few() of `least` columns. Cells of small pictures have a few, for which a loop of its own
 // would take longer than the sum.
 void add_columns(const uint32_t* HWY_RESTRICT sums, const uint32_t* HWY_RESTRICT begin,
                  const uint8_t* HWY_RESTRICT wide, size_t least, size_t count,
@@ -125,7 +125,7 @@ namespace {
 
 // The samples of a plane, which `columns` x `rows` pixels share; it begins with row `top` of the
 // picture.
-struct Samples {
+struct PlaneSamples {
   const uint8_t* plane;
   int top = 0;
   int columns = 1, rows = 1;
@@ -134,8 +134,8 @@ struct Samples {
 constexpr auto kColumns = static_cast<int>(HWY_NAMESPACE::kColumns);
 
 // The sums of columns first .. first + count - 1 of samples, over rows of pixels top .. bottom - 1.
-void sum_rows(const Grid& grid, const Samples& samples, int top, int bottom, int first, int count,
-              uint32_t* sums) {
+void sum_rows(const Grid& grid, const PlaneSamples& samples, int top, int bottom, int first,
+              int count, uint32_t* sums) {
   const auto stride = static_cast<size_t>((grid.width + samples.columns - 1) / samples.columns);
   const int shared = samples.rows, begin = top / shared, last = (bottom - 1) / shared;
   const auto row = [&](int y) { return samples.plane + static_cast<size_t>(y) * stride + first; };
@@ -167,16 +167,16 @@ class Columns {
   }
 
   size_t cols() const { return cols_; }
-  // Samples of a row.
+  // PlaneSamples of a row.
   int all() const { return all_; }
-  // Of a cell: samples left of it, and pixels left of it that share its first sample.
+  // Samples that are left of a cell, and pixels left of it that share its first sample.
   int begin(size_t col) const { return static_cast<int>(begin_[col]); }
   uint32_t parted(size_t col) const { return parted_[col]; }
   // Where the samples end that cells before `col` have a part of.
   int end(size_t col) const { return begin(col) + (parted_[col] > 0 ? 1 : 0); }
   const double* across() const { return across_.data(); }  // pixels
 
-  // Of cells first .. first + count - 1, whose samples' columns have these sums.
+  // Sums of cells first .. first + count - 1, whose samples' columns have these sums.
   void add_up(const uint32_t* sums, size_t first, size_t count, uint64_t* cells) const {
     HWY_DYNAMIC_DISPATCH(add_columns)
     (sums, begin_.data() + first, wide_.data() + first, static_cast<size_t>(least_), count, cells);
@@ -191,9 +191,9 @@ class Columns {
   std::array<uint8_t, kMost> wide_;
 };
 
-// Of rows of cells first .. end - 1.
+// The means of rows of cells first .. end - 1.
 void means_of_rows(const Grid& grid, const Columns& columns, int first_row, int end_row,
-                   const Samples& samples, float* means) {
+                   const PlaneSamples& samples, float* means) {
   // Down the columns first: that is a pass over neighbouring samples.
   alignas(64) uint32_t sums[kColumns + 1];
   std::array<uint64_t, 2 * kMostCellsAlong> cells;
@@ -261,7 +261,7 @@ void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& pictu
   for_rows(pool, rows, pixels, [&](int at, int count) {
     const int first = own + at;
     for (int c = 0; c < kChannels; ++c) {
-      Samples samples = {picture.plane[c], band.first()};
+      PlaneSamples samples = {picture.plane(c), band.first()};
       const bool shared = c > 0 && shares;
       if (shared) samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
       means_of_rows(grid, shared ? shared_ones : own_samples, first, first + count, samples,

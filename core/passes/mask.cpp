@@ -45,7 +45,7 @@ uint16_t sum_five(const uint16_t* const* rows, size_t i) {
   return static_cast<uint16_t>(rows[0][i] + rows[1][i] + rows[2][i] + rows[3][i] + rows[4][i]);
 }
 
-// Of five rows of sums, what is the mean of 25 samples, rounded.
+// Makes five rows of sums the mean of 25 samples, rounded.
 void mean_row(const uint16_t* const* rows, size_t count, uint8_t* out) {
   for (size_t i = 0; i < count; ++i) out[i] = static_cast<uint8_t>((sum_five(rows, i) + 12) / 25);
 }
@@ -337,15 +337,6 @@ bool refine_gain(const GainSums& sums, Gain* gain) {
       (*gain)[c] = static_cast<float>(static_cast<double>(sums[c]) /
                                       static_cast<double>(sums[kChannels + c]));
   return true;
-}
-
-Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
-                 int step) {
-  Gain refined = gain;
-  for (int round = 0; round < kGainRounds; ++round)
-    if (!refine_gain(gain_sums(reference, x, refined, {0, reference.height, step}), &refined))
-      break;
-  return refined;
 }
 
 namespace {

@@ -42,16 +42,12 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Ga
                uint8_t* bits, uint8_t* scratch) noexcept;
 size_t mask_scratch_bytes(int width, int height);
 
-// The frame's gain over the reference by least squares on the sampled pixels that fit it under
-// `gain`; `gain` itself where too few do.
-Gain refine_gain(const ReferencePicture& reference, const uint8_t* const x[3], const Gain& gain,
-                 int step);
-
-// The same in steps, kGainRounds times: sums over sampled rows, which are whole numbers, so that
-// those of parts of a picture add up; and the gain that the sums of all say. False: too few pixels
-// fit, and there is no next round.
+// A frame's gain over the reference by least squares on the sampled pixels that fit it under a gain
+// that is nearly right. It is found in steps, kGainRounds times: sums over sampled rows, which are
+// whole numbers, so that those of parts of a picture add up; and the gain that the sums of all say.
+// False: too few pixels fit, the gain stays as it is, and there is no next round.
 constexpr int kGainRounds = 2;
-// Of each channel x times the reference, and the reference squared; pixels that fit; all.
+// For each channel x times the reference, and the reference squared; pixels that fit; all.
 using GainSums = std::array<int64_t, 2 * kChannels + 2>;
 GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
                    const SampledRows& rows);

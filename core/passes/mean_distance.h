@@ -24,7 +24,8 @@ void keep_beyond(const uint16_t* squared, const uint8_t* limit, size_t count, ui
 struct NoiseRates {
   int factor = 0;           // a pixel's limit is raised as raise_limit() has it
   int most_of_moments = 0;  // in 1/256 of that limit
-  // Of the way, 0 to 1: for background, and for foreground that was none before.
+  // Shares of the way to the newest, 0 to 1: for background, and for foreground that was none
+  // before.
   float share = 0, share_of_moments = 0;
 };
 

@@ -68,10 +68,10 @@ template <size_t... kCounts>
 constexpr std::array<Network, sizeof...(kCounts)> networks_of(std::index_sequence<kCounts...>) {
   return {Network(kCounts)...};
 }
-// Of 0 .. kMedianFrames samples.
+// The networks for 0 .. kMedianFrames samples.
 constexpr auto kNetworks = networks_of(std::make_index_sequence<kMedianFrames + 1>());
 
-// Of a few samples: a call of memcpy would take longer.
+// Copies a few samples: a call of memcpy would take longer.
 void copy_row(const uint8_t* from, size_t count, uint8_t* to) {
   // Two halves that may overlap.
   const auto copy = [&](auto size) {
@@ -154,7 +154,7 @@ class BlockLayout {
     if (const float factor = frame.inverse[channel]; factor != 1)
       HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), factor, to);
   }
-  // Of the samples that pixels share.
+  // Copies the samples that pixels share.
   void spread(const uint8_t* samples, uint8_t* to) const {
     spread_block(block_, across_, samples, to);
   }
@@ -198,7 +198,7 @@ void median_block(const MedianBlock& block, const MedianFrame* frames, size_t co
   const Network& network = kNetworks[count];
   HWY_DYNAMIC_DISPATCH(take_median)(network, all, sorted, median);
 
-  // Of pixels: where they share samples, made of these.
+  // Samples of pixels: where they share samples, made of these.
   alignas(64) uint8_t room[2][kChannels][kRun + kUnit] = {};
   const auto of_pixels = [&](const uint8_t* from, uint8_t(*made)[kRun + kUnit],
                              const uint8_t** out) {

@@ -32,7 +32,7 @@ struct MedianFrame {
   bool is_shared = false;
 };
 
-// Of `count` <= kMedianFrames frames. background[c]: the medians, the mean of the middle two,
+// The medians of `count` <= kMedianFrames frames. background[c]: these, the mean of the middle two,
 // rounded up, where count is even. spread: the median of the quaternion distances from them, in
 // steps of 1/4 level, up to 255; 0 for one frame. Both are of pixels, rows of them `stride` apart.
 void median_block(const MedianBlock& block, const MedianFrame* frames, size_t count, size_t stride,

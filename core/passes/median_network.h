@@ -35,7 +35,7 @@ class MedianNetwork {
   constexpr const Step* end() const { return steps_.data() + size_; }
 
  private:
-  // Of a whole sort.
+  // The binary logarithm, for the size of a whole sort.
   static constexpr size_t log2(size_t n) { return n > 1 ? 1 + log2(n / 2) : 0; }
   static constexpr size_t kRoom = kMost * (log2(kMost) * log2(kMost) - log2(kMost) + 4) / 4 - 1;
 

@@ -262,7 +262,7 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
   const auto rows = static_cast<size_t>(grid.rows), cols = static_cast<size_t>(grid.cols);
   const int known = std::max(count, *std::max_element(reference, reference + grid.cells()) + 1);
   const auto all = static_cast<size_t>(count), stride = round_up(static_cast<size_t>(known));
-  // Of each cell and channel all frames side by side.
+  // The levels of all frames side by side, for each cell and channel.
   LargeVector<uint16_t> own_room;
   if (!room) room = &own_room;
   make_room(room, patch_distance_steps(grid, static_cast<uint64_t>(known)));
@@ -275,7 +275,7 @@ void patch_distance(const Grid& grid, const GridPictures& frames, int count, con
     const size_t first = part * kTogether, size = std::min(kTogether, grid.cells() - first);
     for (size_t c = 0; c < kChannels; ++c)
       for (int t = 0; t < static_cast<int>(stride); ++t) {
-        // Those that only fill vectors are black.
+        // Frames that only fill vectors are black.
         uint16_t of_frame[kTogether] = {};
         if (t < known) HWY_DYNAMIC_DISPATCH(to_steps)
         (frames.plane(t, static_cast<int>(c)) + first, size, of_frame);

@@ -121,7 +121,7 @@ struct Packing {
   }
 };
 
-// Of a frame whose channels have distances of their own.
+// split_channels() of a frame whose channels have distances of their own.
 bool split_uneven(const ImageView& frame, int first_row, int row_count, uint8_t alpha,
                   uint8_t* const planes[3]) {
   const auto width = static_cast<size_t>(frame.width);

@@ -1,21 +1,23 @@
 // Frames in which pixels share samples, read as if each pixel had its own.
 #pragma once
 
-#include "core/gram/window.h"
 #include "core/parallel/pool.h"
+#include "core/passes/sampling.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd {
 
 // Samples of pixels first .. first + count - 1 in row order, of a channel of snapshot `index`:
-// where they are, or, where pixels share them, in `room`, which has space for `count`.
+// where they are, or, where pixels share them, in `room`, which has space for `count`. Of the
+// samples' highest eight bits; and of all of them.
 const uint8_t* read_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
                             size_t count, uint8_t* room);
+Samples read_whole_samples(const SnapshotRange& snapshots, int index, int channel, size_t first,
+                           size_t count, MutableSamples room);
+// The whole sample of one pixel, in units of the lowest bit.
+int read_sample(const SnapshotRange& snapshots, int index, int channel, size_t pixel);
 
-// Of their low digits.
-const uint8_t* read_low_samples(const SnapshotRange& snapshots, int index, int channel,
-                                size_t first, size_t count, uint8_t* room);
-
-// The same of a plane by itself.
+// read_samples() of a plane by itself.
 const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int channel,
                             size_t first, size_t count, uint8_t* room);
 
@@ -23,29 +25,36 @@ const uint8_t* read_samples(const ChromaShape& shape, const uint8_t* plane, int 
 // `room`, which has room_for_planes() bytes; else it may be null. pool may be null.
 void read_planes(const KeptPicture& picture, uint8_t* room, const uint8_t* planes[3],
                  Pool* pool = nullptr);
-inline size_t room_for_planes(const ChromaShape& shape) {
-  return shape.is_shared() ? (kChannels - 1) * shape.pixels() : 0;
+inline size_t room_for_planes(const ChromaShape& shape, int depth = 8) {
+  return shape.is_shared()
+             ? static_cast<size_t>(sample_bytes(depth)) * (kChannels - 1) * shape.pixels()
+             : 0;
 }
+// Copies channel `channel` of a picture, a sample for each pixel.
+void copy_plane(const KeptPicture& picture, int channel, size_t pixels, MutableSamples to);
 
-// The same planes, of which each row is made when a pass comes to it: it is still near then.
+// The planes of a picture, of which each row is made when a pass comes to it: it is still near
+// then.
 class PlaneRows {
  public:
   PlaneRows() = default;
+  // room: as read_planes(), but for the picture's depth.
   PlaneRows(const KeptPicture& picture, uint8_t* room);
 
-  const uint8_t* plane(int channel) const { return planes_[channel]; }
+  const uint8_t* plane(int channel) const { return planes_[channel].high; }
+  Samples samples(int channel) const { return planes_[channel]; }
   // Makes rows first .. first + count - 1, of picture.shape.height. Any threads may make different
   // rows.
   void read(int first, int count) const;
   void read_all(Pool* pool) const;
 
  private:
-  const uint8_t *shared_[kChannels] = {}, *planes_[kChannels] = {};
+  Samples shared_[kChannels], planes_[kChannels];
   uint8_t* room_ = nullptr;
   ChromaShape shape_;
 };
 
-// Reads rows of a picture, one after another.
+// Reads rows of a picture, one after another: the samples' highest eight bits.
 class RowReader {
  public:
   // room: where pixels share samples, space for 2 x width; else it may be null.
@@ -62,6 +71,12 @@ class RowReader {
   int spread_ = -1;  // the row of shared samples that is in the room
 };
 
+// Every step-th pixel of every step-th row, from row `first` to before row `end`, of a picture that
+// is `width` wide. to: of each channel, in row order. room: where pixels share samples, space for
+// `width`; else it may be null.
+void take_samples(const KeptPicture& picture, int width, const SampledRows& rows, uint8_t* room,
+                  const MutableSamples to[3]);
+
 // Where a sampled pixel's samples are in each row of a picture.
 class SampleFinder {
  public:
@@ -70,10 +85,10 @@ class SampleFinder {
 
   void seek(int row) {
     const ChromaShape& shape = picture_.shape;
-    row_[0] = picture_.plane[0] + static_cast<size_t>(row) * width_;
+    row_[0] = picture_.plane(0) + static_cast<size_t>(row) * width_;
     for (int c = 1; c < kChannels; ++c)
       row_[c] =
-          picture_.plane[c] + (shape.is_shared() ? static_cast<size_t>(row / shape.rows) *
+          picture_.plane(c) + (shape.is_shared() ? static_cast<size_t>(row / shape.rows) *
                                                        static_cast<size_t>(shape.chroma_width())
                                                  : static_cast<size_t>(row) * width_);
   }

@@ -188,7 +188,7 @@ HWY_EXPORT(along_deep_row);
 HWY_EXPORT(along_columns);
 HWY_EXPORT(along_deep_columns);
 
-// Of a row's numbers 0 .. count - 1, those for which low <= start + i * step <= high, are one run.
+// The numbers 0 .. count - 1 of a row for which low <= start + i * step <= high are one run.
 struct Run {
   int begin, end;
 };
@@ -224,7 +224,7 @@ class Tiles {
   void read_row(int v, int from);
   void along_row(float place, float step, int count, float* to) const;
   void along_columns(const float* columns, float place, float step, int count);
-  void write(ptrdiff_t at, size_t count);
+  void write(size_t at, size_t count);
 
   static constexpr size_t kStride = kTileWidth + 16;
   static constexpr int kLength = kTileWidth + 2 * kSlack;
@@ -234,40 +234,39 @@ class Tiles {
   alignas(64) T made_[kStride];
 };
 
-template <>
-Tiles<uint8_t>::Tiles(const Resampling& task, ResampleRoom* room)
-    : task_(task), columns_(room->columns_.data()), padded_(room->row_.data()) {}
-template <>
-Tiles<uint16_t>::Tiles(const Resampling& task, ResampleRoom* room)
-    : task_(task), columns_(room->columns_.data()), padded_(room->deep_row_.data()) {}
-
-template <>
-void Tiles<uint8_t>::along_row(float place, float step, int count, float* to) const {
-  HWY_DYNAMIC_DISPATCH(along_row)(padded_, place, step, count, to);
-}
-template <>
-void Tiles<uint16_t>::along_row(float place, float step, int count, float* to) const {
-  HWY_DYNAMIC_DISPATCH(along_deep_row)(padded_, place, step, count, to);
+template <typename T>
+Tiles<T>::Tiles(const Resampling& task, ResampleRoom* room)
+    : task_(task), columns_(room->columns_.data()) {
+  if constexpr (sizeof(T) == 1)
+    padded_ = room->row_.data();
+  else
+    padded_ = room->deep_row_.data();
 }
 
-template <>
-void Tiles<uint8_t>::along_columns(const float* columns, float place, float step, int count) {
-  HWY_DYNAMIC_DISPATCH(along_columns)(columns, kStride, place, step, count, made_);
-}
-template <>
-void Tiles<uint16_t>::along_columns(const float* columns, float place, float step, int count) {
-  const auto most = static_cast<float>((256 << task_.low_bits) - 1);
-  HWY_DYNAMIC_DISPATCH(along_deep_columns)(columns, kStride, place, step, count, most, made_);
+template <typename T>
+void Tiles<T>::along_row(float place, float step, int count, float* to) const {
+  if constexpr (sizeof(T) == 1)
+    HWY_DYNAMIC_DISPATCH(along_row)(padded_, place, step, count, to);
+  else
+    HWY_DYNAMIC_DISPATCH(along_deep_row)(padded_, place, step, count, to);
 }
 
-template <>
-void Tiles<uint8_t>::write(ptrdiff_t at, size_t count) {
-  std::memcpy(task_.to + at, made_, count);
+template <typename T>
+void Tiles<T>::along_columns(const float* columns, float place, float step, int count) {
+  if constexpr (sizeof(T) == 1) {
+    HWY_DYNAMIC_DISPATCH(along_columns)(columns, kStride, place, step, count, made_);
+  } else {
+    const auto most = static_cast<float>((1 << task_.depth) - 1);
+    HWY_DYNAMIC_DISPATCH(along_deep_columns)(columns, kStride, place, step, count, most, made_);
+  }
 }
-template <>
-void Tiles<uint16_t>::write(ptrdiff_t at, size_t count) {
-  split_digits(reinterpret_cast<const uint8_t*>(made_), sizeof(uint16_t), {8 + task_.low_bits, 0},
-               count, task_.to + at, task_.to_low + at);
+
+template <typename T>
+void Tiles<T>::write(size_t at, size_t count) {
+  if constexpr (sizeof(T) == 1)
+    std::memcpy(task_.to.high + at, made_, count);
+  else
+    split_digits(made_, task_.depth, count, task_.to + at);
 }
 
 template <typename T>
@@ -277,12 +276,11 @@ void Tiles<T>::read_row(int v, int from) {
   const int inside = std::clamp(-from, 0, kLength),
             behind = std::clamp(task_.from_width - from, inside, kLength);
   const auto read = [&](ptrdiff_t column, int count, T* to) {
-    const uint8_t* const high = task_.from + start + column;
+    const Samples samples = task_.from + static_cast<size_t>(start + column);
     if constexpr (sizeof(T) == 1)
-      std::memcpy(to, high, static_cast<size_t>(count));
+      std::memcpy(to, samples.high, static_cast<size_t>(count));
     else
-      join_digits(high, task_.from_low + start + column, task_.low_bits, static_cast<size_t>(count),
-                  to);
+      join_digits(samples, task_.depth, static_cast<size_t>(count), to);
   };
   T ends[2];
   read(0, 1, &ends[0]);
@@ -299,7 +297,7 @@ void Tiles<T>::make(int first_row, int row_count) {
              low = static_cast<float>(task_.from_height - 1);
   // Along a row of the picture, output columns are so many of its samples apart.
   const float step = at.xx - at.xy * at.yx / at.yy;
-  // The same tiles for any bands: sums of floats are rounded where they begin.
+  // Tiles are the same for any bands: sums of floats are rounded where they begin.
   for (int top = first_row / kTileHeight * kTileHeight; top < first_row + row_count;
        top += kTileHeight) {
     const int rows = std::min(kTileHeight, task_.height - top);
@@ -338,7 +336,7 @@ void Tiles<T>::make(int first_row, int row_count) {
         along_columns(columns_ + begin,
                       y_start + at.yx * static_cast<float>(begin) - static_cast<float>(first),
                       at.yx, stop - begin);
-        write(static_cast<ptrdiff_t>(y) * task_.width + left + begin,
+        write(static_cast<size_t>(static_cast<ptrdiff_t>(y) * task_.width + left + begin),
               static_cast<size_t>(stop - begin));
       }
     }
@@ -351,7 +349,7 @@ ResampleRoom::ResampleRoom()
       deep_row_(row_.size()) {}
 
 void resample(const Resampling& task, int first_row, int row_count, ResampleRoom* room) {
-  if (task.low_bits > 0)
+  if (task.depth > 8)
     Tiles<uint16_t>(task, room).make(first_row, row_count);
   else
     Tiles<uint8_t>(task, room).make(first_row, row_count);

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/planes/samples.h"
+
 namespace qdmd {
 
 // Where output pixels are in the picture that they are read from: (x, y) shows
@@ -31,16 +33,12 @@ class ResampleRoom {
 };
 
 struct Resampling {
-  const uint8_t* from = nullptr;  // width x height samples, rows without gaps
+  Samples from;  // width x height samples, rows without gaps
   int from_width = 0, from_height = 0;
   Places places;
-  uint8_t* to = nullptr;  // the same
+  MutableSamples to;  // rows without gaps
   int width = 0, height = 0;
-  // Of samples of more than 8 bits, whose high digits the planes above have (core/passes/digits.h):
-  // the low digits; else 0 and nulls.
-  int low_bits = 0;
-  const uint8_t* from_low = nullptr;
-  uint8_t* to_low = nullptr;
+  int depth = 8;  // bits of a sample
 };
 
 // Rows first_row .. first_row + row_count - 1 of `to`, by cubic convolution (the six

@@ -38,7 +38,7 @@ struct Whole {
   const uint8_t* differing(size_t row) const { return rows.differing + row * rows.l_step; }
 };
 
-// Of pixels alone. Returns whether any is shaded.
+// Looks at pixels alone. Returns whether any is shaded.
 HWY_INLINE bool shaded_alone(const Whole& whole, const uint8_t* black, const LightRange& range,
                              uint8_t* HWY_RESTRICT out) {
   const F32 df;

@@ -131,7 +131,7 @@ void soften(const uint8_t* guide, const uint8_t* white, size_t stride, int width
   const auto row = [stride](const uint8_t* samples, int y) {
     return samples + static_cast<size_t>(y) * stride;
   };
-  // Of the last `along` rows of windows; one of them is overwritten by the newest.
+  // Lines of the last `along` rows of windows; one of them is overwritten by the newest.
   Lines all_lines[2 * kMostSoftness + 1];
   Columns sums;
   Row window[4], rooms[2], slope_sums, offset_sums;

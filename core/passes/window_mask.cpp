@@ -49,7 +49,7 @@ void WindowMask::read(int snapshot, size_t first, size_t count, uint8_t* bits) c
   const size_t begin = first / kRun, end = begin + count / kRun;
   for (size_t g = begin / kRuns; g * kRuns < end; ++g) {
     const Group& group = groups[g];
-    // Of this group: those from the first on.
+    // Runs of this group, from the first one on.
     const uint64_t before = g * kRuns < begin ? (uint64_t{1} << (begin - g * kRuns)) - 1 : 0;
     const uint64_t* from = kept + group.before + std::popcount(group.kept & before);
     for (uint64_t left = group.kept & ~before; left != 0; left &= left - 1) {

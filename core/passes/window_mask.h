@@ -39,7 +39,8 @@ class WindowMask {
       keep(snapshot, own);
     });
   }
-  // Of a snapshot pixels first .. first + count - 1, multiples of 64 up to the end of its mask.
+  // Reads a snapshot's pixels first .. first + count - 1, multiples of 64 up to the end of its
+  // mask.
   void read(int snapshot, size_t first, size_t count, uint8_t* bits) const;
   // All of it: mask_bytes().
   void read(int snapshot, uint8_t* bits) const { read(snapshot, 0, words_ * kRun, bits); }

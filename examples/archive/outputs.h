@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/foreground/foreground.h"
+#include "core/foreground/picture.h"
 #include "examples/archive/video_writer.h"
 
 namespace qdmd::archive {

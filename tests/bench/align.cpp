@@ -64,7 +64,7 @@ void move(benchmark::State& state, Size size, const Pose& pose) {
   resampler.prepare(nullptr);
   const qdmd::Affine place = affine(pose, qdmd::middle_of(size.width, size.height));
   for (auto _ : state)
-    resampler.run(frames[0].data(), place, out.data(), size.width, size.height, nullptr);
+    resampler.run(frames[0].data(), 8, place, out.data(), size.width, size.height, nullptr);
   benchmark::DoNotOptimize(out.data());
 }
 

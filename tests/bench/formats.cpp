@@ -54,7 +54,7 @@ bool is_rgb(const Format& format) {
 
 // What the default keeps of frames.
 FrameContents contents_of(const Format& format) {
-  FrameContents contents = {1, 0, 1, 1, format.bits.low()};
+  FrameContents contents = {1, 0, 1, 1, format.bits.depth};
   const ChannelAt& chroma = format.at[1];
   if (chroma.columns > 1)
     contents.chroma_columns = chroma.columns, contents.chroma_rows = chroma.rows;
@@ -64,8 +64,8 @@ FrameContents contents_of(const Format& format) {
 // A frame of a format, planes for it, and a background.
 struct Scene {
   int width, height;
-  std::vector<uint8_t> planes[4], x[3], mask, chroma[2];
-  const uint8_t *own[3] = {}, *low[3] = {};
+  std::vector<uint8_t> planes[4], x[3], mask, chroma;
+  PlaneRows own;
   FrameStore store;
   MutableImageView view;
   BackgroundModel model;
@@ -73,7 +73,7 @@ struct Scene {
 
   Scene(const Format& format, int width_, int height_)
       : width(width_), height(height_), store(1, width_, height_, contents_of(format)) {
-    for (auto& room : chroma) room.resize(room_for_planes(store.window().shape()));
+    chroma.resize(room_for_planes(store.window().shape(), format.bits.depth));
     const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
     std::array<ptrdiff_t, 4> stride{};
     for (const ChannelAt& at : format.at)
@@ -100,9 +100,9 @@ struct Scene {
     for (auto& plane : x) plane.resize(pixels, 100);
     for (size_t p = 0; p < pixels; ++p) mask.push_back(p % 300 < 30 ? 255 : 0);
     split();
-    model.set_low_bits(format.bits.low());
+    model.set_depth(format.bits.depth);
     model.make_room(pixels, false);
-    model.freeze_as(x, nullptr, pixels);
+    model.freeze_as({8, {x[0], x[1], x[2]}, {}}, nullptr, pixels);
     model.set_time(0);
   }
 
@@ -116,14 +116,13 @@ struct Scene {
     in.alpha = view.alpha;
     for (int c = 0; c < 4; ++c) in.own[c] = view.own[c];
     benchmark::DoNotOptimize(store.append(in));
-    const int slot = store.slot(0);
-    read_planes(store.window().picture(slot), chroma[0].data(), own);
-    if (view.bits.is_deep()) read_planes(store.low_picture(slot), chroma[1].data(), low);
+    own = PlaneRows(store.window().picture(store.slot(0)), chroma.data());
+    own.read_all(nullptr);
     benchmark::ClobberMemory();
   }
   void write(Output output) {
     OutputTask task = {};
-    for (int c = 0; c < 3; ++c) task.x[c] = own[c], task.low[c] = low[c];
+    for (int c = 0; c < 3; ++c) task.x[c] = own.samples(c);
     task.model = &model, task.output = output, task.mask = mask.data(), task.constant_alpha = 255;
     write_picture(task, levels, view, 0, height);
   }

@@ -157,7 +157,7 @@ void window_of_shared_chroma(benchmark::State& state, const Kernel& kernel, cons
         window.plane(slot, channel)[p] = static_cast<uint8_t>(rng() >> 9);
   }
   Pool pool(c.threads);
-  SlidingGram gram(c.frames, shape, &pool, kernel);
+  SlidingGram gram(c.frames, shape, 8, &pool, kernel);
   const clockid_t clock = c.threads == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
   const int slice = (shape.chroma_height() + c.slices - 1) / c.slices;
   for (auto _ : state) {

@@ -53,7 +53,7 @@ struct Street {
         background[c].push_back(seen[kFrames / 2]);
       }
     model.make_room(size.pixels(), false);
-    model.freeze_as(background, nullptr, size.pixels());
+    model.freeze_as({8, {background[0], background[1], background[2]}, {}}, nullptr, size.pixels());
     model.set_time(0);
     limits.assign(size.pixels(), 30);
   }
@@ -132,7 +132,8 @@ void add_softness(int softness, const Size& size) {
             soft = std::make_shared<SoftMask>(size.width, size.height)](Street& street) {
       const Comparison frame = street.frame(false);
       decision->decide(frame, nullptr);
-      return computed([&] { soft->make(*decision, frame.x, {softness, 18}, {}, nullptr); });
+      const uint8_t* const x[3] = {frame.x[0].high, frame.x[1].high, frame.x[2].high};
+      return computed([&] { soft->make(*decision, x, {softness, 18}, {}, nullptr); });
     };
   });
 }

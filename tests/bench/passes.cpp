@@ -12,10 +12,11 @@
 
 #include "core/foreground/decision.h"
 #include "core/foreground/foreground.h"
-#include "core/gram/window.h"
+#include "core/foreground/picture.h"
 #include "core/passes/combine.h"
 #include "core/passes/planes.h"
 #include "core/passes/residual.h"
+#include "core/planes/snapshot_range.h"
 #include "tests/bench/camera.h"
 #include "tests/bench/clock.h"
 
@@ -94,7 +95,7 @@ struct Scene {
         median[c].push_back(seen[static_cast<size_t>(size.window / 2)]);
       }
     clean.make_room(size.pixels(), false);
-    clean.freeze_as(median, nullptr, size.pixels());
+    clean.freeze_as({8, {median[0], median[1], median[2]}, {}}, nullptr, size.pixels());
     clean.set_time(0);
   }
 
@@ -229,7 +230,7 @@ void add_output(const char* name, Output output, const Size& size) {
                              nullptr,
                              255};
     if (output == Output::mask || output == Output::cutout) scene.decide();
-    write_output(task, view_of(scene.size, scene.packed_out()), 0, scene.size.height);
+    write_picture(task, {}, view_of(scene.size, scene.packed_out()), 0, scene.size.height);
   });
 }
 
@@ -330,7 +331,7 @@ void add_all(const Size& size) {
         return all;
       },
       [](Scene& scene) {
-        // Rows without gaps are one long row, as write_output has it.
+        // Rows without gaps are one long row, as write_picture has it.
         const size_t pixels = scene.size.pixels();
         const MutableImageView out = view_of(scene.size, scene.packed_out());
         for (size_t first = 0; first < pixels; first += kMaxRun) {

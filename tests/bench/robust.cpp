@@ -43,7 +43,7 @@ struct Solve {
   ReferencePicture reference;
   std::vector<uint8_t> spread, reach, scratch, bits;
   WindowMask mask;
-  Filler filler;
+  Filler<uint8_t> filler;
   int turn = 0;
 
   explicit Solve(const Size& size_)
@@ -195,7 +195,7 @@ void add_all(const Size& size) {
         uint8_t* const out[3] = {solve.spread.data(), solve.spread.data(), solve.spread.data()};
         solve.mask.read(t, solve.bits.data());
         fill_samples(solve.reference, solve.bits.data(), solve.x(t).data(), kSameLight,
-                     solve.reach.data(), 4, out);
+                     solve.reach.data(), {0, solve.size.height, 4}, out);
       });
   add("fill", size, "ns/pixel", all_pixels, [](Solve& solve) {
     const size_t all = solve.size.pixels();

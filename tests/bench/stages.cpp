@@ -103,10 +103,10 @@ class Batch {
                              nullptr,
                              nullptr,
                              255};
-    background_.decide(x, nullptr, &pool_);
+    background_.decide(x, &pool_);
     const auto bands = static_cast<int>(std::max<size_t>(1, window.pixels() / kPixelsPerBand));
     for_bands(pool_, c_.height, bands, [&](int first, int count, size_t) {
-      write_output(task, view_of(c_, out_.data()), first, count);
+      write_picture(task, {}, view_of(c_, out_.data()), first, count);
     });
     benchmark::ClobberMemory();
   }

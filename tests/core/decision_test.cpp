@@ -29,7 +29,8 @@ BackgroundModel model_of(const Planes& background, uint8_t limit = 12) {
   BackgroundModel model;
   const std::vector<uint8_t> limits(background.pixels(), limit);
   model.make_room(background.pixels(), true);
-  model.freeze_as(background.level, &limits, background.pixels());
+  model.freeze_as({8, {background.level[0], background.level[1], background.level[2]}, {}}, &limits,
+                  background.pixels());
   model.set_time(0);
   return model;
 }

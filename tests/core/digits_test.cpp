@@ -38,10 +38,10 @@ TEST(Digits, AreTheBitsOfWordsAtAnyDistance) {
           // Bits around the samples are random, too. The last word is the last that may be read.
           BeforeTheEdge<uint8_t> from((count - 1) * stride + 2), high(count), low(count);
           fill_randomly(from, 255);
-          split_digits(from.data(), static_cast<ptrdiff_t>(stride), bits, count, high.data(),
-                       low.data());
+          split_digits(from.data(), static_cast<ptrdiff_t>(stride), bits, count,
+                       {high.data(), low.data()});
           BeforeTheEdge<uint16_t> joined(count);
-          join_digits(high.data(), low.data(), bits.low(), count, joined.data());
+          join_digits({high.data(), low.data()}, bits.depth, count, joined.data());
           for (size_t p = 0; p < count; ++p) {
             const int sample = word_at(from.data() + p * stride) >> bits.shift & bits.most();
             ASSERT_EQ(high[p], sample >> bits.low()) << p << " of " << count << ", " << stride;
@@ -107,17 +107,18 @@ TEST(Digits, OfAPixelAreAsFarFromTheBackgroundAsWholeSamples) {
           fill_randomly(digits.emplace_back(count), (1 << low_bits) - 1);
           fill_randomly(background.emplace_back(count), (256 << low_bits) - 1);
         }
-        const uint8_t* const high[3] = {digits[0].data(), digits[2].data(), digits[4].data()};
-        const uint8_t* const low[3] = {digits[1].data(), digits[3].data(), digits[5].data()};
+        const Samples x[3] = {{digits[0].data(), digits[1].data()},
+                              {digits[2].data(), digits[3].data()},
+                              {digits[4].data(), digits[5].data()}};
         const uint16_t* const l[3] = {background[0].data(), background[1].data(),
                                       background[2].data()};
         BeforeTheEdge<uint64_t> out(count);
-        squared_units(high, low, low_bits, l, count, out.data());
+        squared_units(x, 8 + low_bits, l, count, out.data());
         for (size_t p = 0; p < count; ++p) {
           int64_t sum = 0;
           for (int c = 0; c < 3; ++c) {
-            const int64_t x = (int64_t{high[c][p]} << low_bits) + low[c][p];
-            sum += (x - l[c][p]) * (x - l[c][p]);
+            const int64_t whole = (int64_t{x[c].high[p]} << low_bits) + x[c].low[p];
+            sum += (whole - l[c][p]) * (whole - l[c][p]);
           }
           ASSERT_EQ(out[p], static_cast<uint64_t>(sum));
         }
@@ -179,7 +180,7 @@ TEST(DeepLevels, AreRoundedToTheirDepth) {
         BeforeTheEdge<uint8_t> red(count), green(count), blue(count);
         uint16_t* const deep[3] = {r.data(), g.data(), b.data()};
         uint8_t* const high[3] = {red.data(), green.data(), blue.data()};
-        deep_levels_of(weights, rows, kPictures, low_bits, 0, count, deep);
+        deep_levels_of(weights, rows, kPictures, 8 + low_bits, 0, count, deep);
         high_digits_of(weights, rows, kPictures, 0, count, high);
         const double most = (256 << low_bits) - 1;
         for (size_t p = 0; p < count; ++p)
@@ -223,24 +224,22 @@ TEST(DeepPlanes, AreCombinedAsOthers) {
   });
 }
 
-// Two windows of digits, and the samples that they are.
+// A window of random samples.
 struct DeepWindow {
   int low_bits;
-  Window high;
-  PlaneSlots low;
+  Window window;
 
   DeepWindow(int capacity, size_t pixels, int bits)
-      : low_bits(bits), high(capacity, pixels), low(capacity, pixels) {}
+      : low_bits(bits), window(capacity, pixels, 8 + bits) {}
   void append() {
-    const int slot = high.append();
-    low.pad(slot);
+    const int slot = window.append();
     for (int c = 0; c < kChannels; ++c)
-      for (size_t p = 0; p < high.pixels(); ++p) {
-        high.plane(slot, c)[p] = static_cast<uint8_t>(rng() % 256);
-        low.plane(slot, c)[p] = static_cast<uint8_t>(rng() % (1u << low_bits));
+      for (size_t p = 0; p < window.pixels(); ++p) {
+        window.samples(slot, c).high[p] = static_cast<uint8_t>(rng() % 256);
+        window.samples(slot, c).low[p] = static_cast<uint8_t>(rng() % (1u << low_bits));
       }
   }
-  SnapshotRange all() const { return SnapshotRange(high).with_low(low, low_bits); }
+  SnapshotRange all() const { return window; }
 };
 
 void expect_products(const SnapshotRange& snapshots, const IntegerMatrix& gram) {
@@ -260,7 +259,7 @@ TEST(DeepGram, IsExactForWholeSamples) {
   for (int low_bits : {1, 2, 4, 8})
     for (size_t pixels : {size_t{1}, size_t{63}, size_t{200}}) {
       DeepWindow window(5, pixels, low_bits);
-      SlidingGram gram(5, low_bits, nullptr);
+      SlidingGram gram(5, {}, 8 + low_bits);
       for (int t = 0; t < 12; ++t) {
         window.append();
         const SnapshotRange all = window.all();
@@ -270,12 +269,13 @@ TEST(DeepGram, IsExactForWholeSamples) {
         expect_products(all, gram.matrix(all));
         if (testing::Test::HasFatalFailure()) return;
       }
-      gram.add_slice(window.all(), 5, 0, window.high.plane_size());
+      gram.add_slice(window.all(), 5, 0, window.window.plane_size());
       expect_products(window.all(), gram.matrix(window.all()));
     }
 }
 
-// Filler::fill_deep() by its definition, in light that rounds the same way in any order of steps.
+// Filler<uint16_t>::fill() by its definition, in light that rounds the same way in any order of
+// steps.
 TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
   on_every_target([] {
     for (int low_bits : {2, 4, 8})
@@ -300,7 +300,7 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
               // Most are near the reference, some are not; some pixels are masked in all.
               for (size_t c = 0; c < 3; ++c)
                 if (rng() % 4 != 0)
-                  window.high.plane(t, static_cast<int>(c))[p] =
+                  window.window.plane(t, static_cast<int>(c))[p] =
                       static_cast<uint8_t>(std::clamp(reference.level[c][p] * gains.back()[c] +
                                                           2.0f * static_cast<float>(rng() % 3),
                                                       0.0f, 255.0f));
@@ -318,12 +318,12 @@ TEST(DeepFilling, IsTheMedianAndTheReachOfWholeSamples) {
           };
           std::vector<uint8_t> reach((pixels + 63) / 64 * 64);
           for (auto& r : reach) r = static_cast<uint8_t>(rng() % 12);
-          Filler filler(snapshots, true);
+          Filler<uint16_t> filler(snapshots);
           const SnapshotRange all = window.all();
           for (size_t first = 0; first < pixels; first += filler.run()) {
             const size_t count = std::min(filler.run(), pixels - first);
             const uint16_t* const* filled =
-                filler.fill_deep(all, gains, mask, reference, reach.data(), first, count);
+                filler.fill(all, gains, mask, reference, reach.data(), first, count);
             for (size_t c = 0; c < 3; ++c)
               for (size_t p = first; p < first + count; ++p) {
                 std::vector<int> own, kept;

@@ -79,18 +79,18 @@ TEST(FrameStore, KeepsAlphaOnceItVaries) {
   EXPECT_EQ(store.bytes_with_alpha(), without + 3 * kWidth * kHeight);
   PackedPicture constant = random_frame(rng, true, 77);
   ASSERT_TRUE(store.append(constant.in()));
-  EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
+  EXPECT_FALSE(store.alpha(store.slot(0)));
   EXPECT_EQ(store.constant_alpha(store.slot(0)), 77);
   EXPECT_EQ(store.bytes(), without);
   PackedPicture varying = random_frame(rng, true);
   ASSERT_TRUE(store.append(varying.in()));
   EXPECT_EQ(store.bytes(), store.bytes_with_alpha());
-  EXPECT_EQ(store.alpha(store.slot(0)), nullptr);
+  EXPECT_FALSE(store.alpha(store.slot(0)));
   for (size_t p = 0; p < varying.pixels(); ++p)
-    ASSERT_EQ(store.alpha(store.slot(1))[p], varying.at(3, p));
+    ASSERT_EQ(store.alpha(store.slot(1)).high[p], varying.at(3, p));
   // A slot that varied and is constant again.
   for (int t = 0; t < 3; ++t) ASSERT_TRUE(store.append(constant.in()));
-  EXPECT_EQ(store.alpha(store.slot(1)), nullptr);
+  EXPECT_FALSE(store.alpha(store.slot(1)));
   EXPECT_EQ(store.constant_alpha(store.slot(1)), 77);
 }
 
@@ -133,7 +133,7 @@ struct DeepFrame {
 TEST(DeepFrameStore, HasBothDigitsOfEverything) {
   std::mt19937 rng(405);
   for (int step : {1, 3}) {
-    const FrameContents contents = {step, 0, 1, 1, DeepFrame::kBits.low()};
+    const FrameContents contents = {step, 0, 1, 1, DeepFrame::kBits.depth};
     FrameStore store(3, kWidth, kHeight, contents);
     EXPECT_EQ(store.bytes(), FrameStore::bytes(3, kWidth, kHeight, contents));
     std::deque<DeepFrame> held;
@@ -142,8 +142,7 @@ TEST(DeepFrameStore, HasBothDigitsOfEverything) {
       held.emplace_back(rng, varies);
       if (held.size() > 3) held.pop_front();
       ASSERT_TRUE(store.append(held.back().view()));
-      const SnapshotRange whole = store.whole(store.window()),
-                          samples = store.whole_samples(store.window());
+      const SnapshotRange whole = store.window(), samples = whole.in(store.samples());
       for (int i = 0; i < store.size(); ++i) {
         const DeepFrame& frame = held[static_cast<size_t>(i)];
         size_t sample = 0;
@@ -160,11 +159,11 @@ TEST(DeepFrameStore, HasBothDigitsOfEverything) {
           }
       }
       const int slot = store.window().newest_slot();
-      ASSERT_EQ(store.alpha(slot) != nullptr, varies);
+      ASSERT_EQ(bool(store.alpha(slot)), varies);
       for (size_t p = 0; varies && p < size_t{kWidth} * kHeight; ++p)
-        ASSERT_EQ(store.alpha(slot)[p] << 4 | store.alpha_low(slot)[p], held.back().sample(3, p));
+        ASSERT_EQ(sample_at(store.alpha(slot), p, 12), held.back().sample(3, p));
       if (!varies) {
-        EXPECT_EQ(store.constant_alpha(slot) << 4 | store.constant_alpha_low(slot), 0x1254 >> 2);
+        EXPECT_EQ(store.constant_alpha(slot), 0x1254 >> 2);
       }
     }
   }
@@ -174,7 +173,7 @@ TEST(DeepFrameStore, HasBothDigitsOfEverything) {
 // outside of the frame those of the frame before. At rest again it is as it came.
 TEST(DeepFrameStore, KeepsWhatCameOfFramesThatAreMoved) {
   std::mt19937 rng(406);
-  const FrameContents contents = {1, 0, 1, 1, DeepFrame::kBits.low()};
+  const FrameContents contents = {1, 0, 1, 1, DeepFrame::kBits.depth};
   FrameStore store(2, kWidth, kHeight, contents);
   const DeepFrame frame(rng, false);
   const DeepFrame before(rng, false);
@@ -186,17 +185,16 @@ TEST(DeepFrameStore, KeepsWhatCameOfFramesThatAreMoved) {
   pose.x = 3;
   ASSERT_TRUE(store.steady(1, pose, &resampler, &pool));
   const int slot = store.slot(1);
-  const SnapshotRange moved = store.whole(store.window());
+  const SnapshotRange moved = store.window();
   for (int c = 0; c < kChannels; ++c)
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x) {
         const auto p = static_cast<size_t>(y * kWidth + x);
-        ASSERT_EQ(store.untouched(slot, c)[p] << 4 | store.untouched_low(slot, c)[p],
-                  frame.sample(c, p));
+        ASSERT_EQ(sample_at(store.untouched(slot, c), p, 12), frame.sample(c, p));
         ASSERT_EQ(moved.sample(1, c, p), x < 3 ? before.sample(c, p) : frame.sample(c, p - 3));
       }
   ASSERT_TRUE(store.steady(1, Pose(), &resampler, &pool));
-  const SnapshotRange whole = store.whole(store.window());
+  const SnapshotRange whole = store.window();
   for (int c = 0; c < kChannels; ++c)
     for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p)
       ASSERT_EQ(whole.sample(1, c, p), frame.sample(c, p));

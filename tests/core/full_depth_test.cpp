@@ -38,17 +38,20 @@ TEST(FullDepth, LimitsOfPixelsAreComparedWithWholeSamples) {
         }
       }
       BackgroundModel model;
-      model.set_low_bits(low_bits);
-      model.freeze_as(ground, nullptr, kAll);
+      model.set_depth(depth);
+      model.freeze_as({8, {ground[0], ground[1], ground[2]}, {}}, nullptr, kAll);
       std::vector<float> levels(level.size());
       for (size_t i = 0; i < level.size(); ++i)
         levels[i] = static_cast<float>(level[i]) / static_cast<float>(unit);
       const float* const own[3] = {levels.data(), levels.data() + kAll, levels.data() + 2 * kAll};
       model.replace(0, kAll, own);
       model.set_time(0);
-      Comparison frame = {{high[0].data(), high[1].data(), high[2].data()}, &model, threshold};
+      Comparison frame = {{{high[0].data(), low[0].data()},
+                           {high[1].data(), low[1].data()},
+                           {high[2].data(), low[2].data()}},
+                          &model,
+                          threshold};
       frame.limits = limits.data();
-      for (size_t c = 0; c < 3; ++c) frame.low[c] = low[c].data();
       Decision decision(kWide, Band(kHigh), Colours::rgb, steps);
       decision.decide(frame, nullptr);
       size_t foreground = 0;

@@ -1,5 +1,5 @@
 // Areas in which nothing is foreground, and from which nothing is learnt.
-#include "core/foreground/ignored.h"
+#include "core/base/ignored_areas.h"
 
 #include "tests/core/engine_util.h"
 #include "tests/core/mask_util.h"

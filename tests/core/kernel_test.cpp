@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/gram/window.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd::test {
 namespace {

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/gram/window.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd::test {
 namespace {

@@ -22,7 +22,7 @@ Learnt small(bool limits, bool earlier, int low_bits = 0) {
     for (uint8_t& level : levels) level = next = static_cast<uint8_t>(7 * next + 1);
     return levels;
   };
-  for (auto& level : learnt.level) level = plane();
+  for (auto& level : learnt.picture.level) level = plane();
   if (limits) learnt.limits = plane();
   if (earlier) {
     auto& e = learnt.earlier.emplace();
@@ -33,11 +33,11 @@ Learnt small(bool limits, bool earlier, int low_bits = 0) {
     e.weight = {0, 1.5f, 2, 3e6f, 4, 0.001f};
     e.limit = {6, 7, 8, 9, 10, 11};
   }
-  learnt.low_bits = low_bits;
-  for (auto& low : learnt.low) {
+  learnt.picture.depth = 8 + low_bits;
+  for (auto& below : learnt.picture.below) {
     if (low_bits == 0) continue;
-    low = plane();
-    for (uint8_t& digit : low) digit = static_cast<uint8_t>(digit >> (8 - low_bits));
+    below = plane();
+    for (uint8_t& digit : below) digit = static_cast<uint8_t>(digit >> (8 - low_bits));
   }
   return learnt;
 }
@@ -53,7 +53,7 @@ Learnt large() {
       number = static_cast<uint8_t>((next = 1664525 * next + 1013904223) >> 24);
   };
   auto& earlier = learnt.earlier.value();
-  for (auto* levels : {&learnt.level, &earlier.level})
+  for (auto* levels : {&learnt.picture.level, &earlier.level})
     for (auto& level : *levels) fill(&level);
   fill(&learnt.limits);
   fill(&earlier.spread);
@@ -68,9 +68,9 @@ void expect_equal(const Learnt& a, const Learnt& b) {
   EXPECT_EQ(a.width, b.width);
   EXPECT_EQ(a.height, b.height);
   EXPECT_EQ(a.colours, b.colours);
-  for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.level[c], b.level[c]);
-  EXPECT_EQ(a.low_bits, b.low_bits);
-  for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.low[c], b.low[c]);
+  for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.picture.level[c], b.picture.level[c]);
+  EXPECT_EQ(a.picture.depth, b.picture.depth);
+  for (size_t c = 0; c < 3; ++c) EXPECT_EQ(a.picture.below[c], b.picture.below[c]);
   EXPECT_EQ(a.limits, b.limits);
   EXPECT_EQ(a.noise, b.noise);
   ASSERT_EQ(a.earlier.has_value(), b.earlier.has_value());
@@ -137,7 +137,7 @@ TEST(LearntFile, TheVersionBeforeIsRead) {
 TEST(LearntFile, DigitsThatAreTooLargeAreSeen) {
   Learnt learnt = small(false, false, 2);
   EXPECT_TRUE(unpack_it(pack(learnt)).ok());
-  learnt.low[1][7] = 4;
+  learnt.picture.below[1][7] = 4;
   EXPECT_FALSE(unpack_it(pack(learnt)).ok());
 }
 

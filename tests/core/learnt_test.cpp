@@ -52,7 +52,8 @@ struct Box {
 
 std::vector<uint8_t> planes_of(const Learnt& learnt) {
   std::vector<uint8_t> planes;
-  for (const auto& level : learnt.level) planes.insert(planes.end(), level.begin(), level.end());
+  for (const auto& level : learnt.picture.level)
+    planes.insert(planes.end(), level.begin(), level.end());
   return planes;
 }
 
@@ -99,7 +100,7 @@ Learnt plain(int width, int height) {
   Learnt learnt;
   learnt.width = width;
   learnt.height = height;
-  for (auto& level : learnt.level) level.assign(static_cast<size_t>(width * height), 77);
+  for (auto& level : learnt.picture.level) level.assign(static_cast<size_t>(width * height), 77);
   return learnt;
 }
 

@@ -63,7 +63,8 @@ class Watcher {
   explicit Watcher(const Floor& background)
       : decision_(background.width, background.height, Colours::rgb) {
     model_.make_room(background.pixels(), false);
-    model_.freeze_as(background.level, nullptr, background.pixels());
+    model_.freeze_as({8, {background.level[0], background.level[1], background.level[2]}, {}},
+                     nullptr, background.pixels());
     model_.set_time(0);
   }
   std::vector<uint8_t> mask_of(const Floor& frame, const IgnoredAreas* ignored = nullptr,

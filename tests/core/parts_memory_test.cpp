@@ -9,7 +9,6 @@
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/soft_mask.h"
 #include "core/foreground/specks.h"
-#include "core/gram/window.h"
 #include "core/learn/robust/absorbed.h"
 #include "core/learn/robust/clutter.h"
 #include "core/learn/robust/light.h"
@@ -19,6 +18,7 @@
 #include "core/passes/fill.h"
 #include "core/passes/grid.h"
 #include "core/passes/patch_density.h"
+#include "core/planes/snapshot_range.h"
 #include "tests/core/allocator.h"
 #include "tests/core/test_util.h"
 
@@ -65,8 +65,8 @@ TEST_P(PartsMemory, OfAPicture) {
   expect("LightScratch", LightScratch::bytes(grid.cells()),
          [&] { LightScratch part(grid.cells()); });
   expect("Restorer", Restorer::bytes(width, height), [&] { Restorer part(width, height); });
-  expect("Restorer of more than 8 bits", Restorer::bytes(width, height, true),
-         [&] { Restorer part(width, height, 2); });
+  expect("Restorer of more than 8 bits", Restorer::bytes(width, height, 10),
+         [&] { Restorer part(width, height, 10); });
   constexpr int kLooks = 9;
   const GridFrames frames(grid, kLooks);
   const GridPictures looks(frames);
@@ -98,9 +98,9 @@ TEST_P(PartsMemory, OfAWindow) {
   for (const int snapshots : {1, 2, 100}) {
     SCOPED_TRACE(std::to_string(snapshots) + " snapshots");
     const auto count = static_cast<uint64_t>(snapshots);
-    expect("Filler", Filler::bytes(snapshots), [&] { Filler part(snapshots); });
-    expect("Filler of more than 8 bits", Filler::bytes(snapshots, true),
-           [&] { Filler part(snapshots, true); });
+    expect("Filler", Filler<uint8_t>::bytes(snapshots), [&] { Filler<uint8_t> part(snapshots); });
+    expect("Filler of more than 8 bits", Filler<uint16_t>::bytes(snapshots),
+           [&] { Filler<uint16_t> part(snapshots); });
     expect("WindowMask", WindowMask::bytes(snapshots, pixels),
            [&] { WindowMask part(snapshots, pixels); });
     expect("PlaneSlots", PlaneSlots::bytes(snapshots, pixels),

@@ -89,7 +89,7 @@ struct Scene {
       // Runs of what masks mostly are.
       if (p % 16 < 8) soft[p] = hard[p];
     }
-    model.freeze_as(level, nullptr, pixels);
+    model.freeze_as({8, {level[0], level[1], level[2]}, {}}, nullptr, pixels);
     model.set_time(0);
   }
 };
@@ -138,7 +138,6 @@ void expect_picture(Scene& scene, const VideoLayout& layout, const Asked& asked,
                      asked.own_alpha ? scene.alpha.data() : nullptr,
                      200,
                      asked.soft};
-  std::copy_n(levels.black, 3, task.black);
   const MutableImageView view = out.view<uint8_t>();
   const int together = rows_together(view);
   // In two bands, as threads do it.

@@ -88,7 +88,7 @@ TEST(Background, MeanOfSharedSamplesOfMoreThanEightBits) {
   LearnOptions options;
   options.method = Method::qdmd;
   const SampleBits bits = {10, 6};
-  const FrameContents contents = {1, 0, 2, 2, bits.low()};
+  const FrameContents contents = {1, 0, 2, 2, bits.depth};
   FrameStore frames(kFrames, kWidth, kHeight, contents);
   const VideoLayout layout = of_words(kVideoLayouts[2]);
   const auto word = [](int t, int c, int x, int y) {
@@ -105,10 +105,10 @@ TEST(Background, MeanOfSharedSamplesOfMoreThanEightBits) {
     ASSERT_TRUE(frames.append(picture.view<const uint8_t>()));
   }
   BackgroundModel model;
-  model.set_low_bits(bits.low());
+  model.set_depth(bits.depth);
   Pool pool(2);
-  const SnapshotRange whole = frames.whole(frames.window());
-  model.begin(whole, mean_of_frames(kFrames), true);
+  const SnapshotRange whole = frames.window();
+  model.begin_from(kFrames, whole.pixels(), mean_of_frames(kFrames));
   build_spread(whole, 0, whole.pixels(), &pool, &model);
   model.set_time(1);
   std::vector<uint16_t> out(3 * whole.pixels());

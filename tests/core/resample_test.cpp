@@ -67,16 +67,12 @@ void expect_plain(const Case& at) {
   std::fill(to.begin(), to.end(), kOutside);
   std::fill(to_low.begin(), to_low.end(), kLowOutside);
   Resampling task;
-  task.from = from.data();
+  task.depth = 8 + at.low_bits;
+  task.from = {from.data(), at.low_bits > 0 ? from_low.data() : nullptr};
   task.from_width = task.width = at.width;
   task.from_height = task.height = at.height;
   task.places = at.places;
-  task.to = to.data();
-  if (at.low_bits > 0) {
-    task.low_bits = at.low_bits;
-    task.from_low = from_low.data();
-    task.to_low = to_low.data();
-  }
+  task.to = {to.data(), at.low_bits > 0 ? to_low.data() : nullptr};
   ResampleRoom room;
   // In bands, as threads do.
   for (int first = 0; first < at.height; first += 37)
@@ -123,12 +119,12 @@ TEST(Resample, AtRestIsTheSamePicture) {
     Resampler resampler;
     resampler.prepare(nullptr);
     const Affine rest = affine(Pose(), middle_of(301, 77));
-    resampler.run(from.data(), rest, to.data(), 301, 77, nullptr);
+    resampler.run(from.data(), 8, rest, to.data(), 301, 77, nullptr);
     EXPECT_EQ(from, to);
     const std::vector<uint8_t> low(from.rbegin(), from.rend());
     std::vector<uint8_t> deep(from.size(), kOutside), deep_low(deep);
-    resampler.run_deep(from.data(), low.data(), 8, rest, deep.data(), deep_low.data(), 301, 77,
-                       nullptr);
+    resampler.run({from.data(), low.data()}, 16, rest, {deep.data(), deep_low.data()}, 301, 77,
+                  nullptr);
     EXPECT_EQ(from, deep);
     EXPECT_EQ(low, deep_low);
   });
@@ -142,8 +138,8 @@ TEST(Resample, IsTheSameForAnyNumberOfThreads) {
   Pool pool(3);
   Resampler resampler;
   resampler.prepare(&pool);
-  resampler.run(from.data(), place, alone.data(), 320, 240, nullptr);
-  resampler.run(from.data(), place, together.data(), 320, 240, &pool);
+  resampler.run(from.data(), 8, place, alone.data(), 320, 240, nullptr);
+  resampler.run(from.data(), 8, place, together.data(), 320, 240, &pool);
   EXPECT_EQ(alone, together);
 }
 
@@ -153,7 +149,7 @@ TEST(Resample, FarAwayNothingIsWritten) {
   Resampler resampler;
   resampler.prepare(nullptr);
   for (const Pose& pose : {Pose{1e6, 0, 0, 1}, Pose{0, -1e6, 0, 1}, Pose{-1e4, 1e4, 0.02, 1}})
-    resampler.run(from.data(), affine(pose, middle_of(64, 48)), to.data(), 64, 48, nullptr);
+    resampler.run(from.data(), 8, affine(pose, middle_of(64, 48)), to.data(), 64, 48, nullptr);
   EXPECT_EQ(to, std::vector<uint8_t>(to.size(), kOutside));
 }
 

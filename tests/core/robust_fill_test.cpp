@@ -279,7 +279,7 @@ struct MaskedWindow {
 };
 
 void expect_filled(const MaskedWindow& w, bool draw, int tolerance = 0) {
-  Filler filler(w.window.size());
+  Filler<uint8_t> filler(w.window.size());
   const size_t pixels = w.window.pixels();
   for (size_t first = 0; first < pixels; first += filler.run()) {
     const size_t count = std::min(filler.run(), pixels - first);
@@ -339,7 +339,7 @@ TEST(Filler, WindowsMayBeLong) {
 TEST(Filler, RunsCoverLargePictures) {
   std::mt19937 rng(53);
   const MaskedWindow w(9, 20001, 30, {1}, rng);
-  ASSERT_LT(Filler(9).run(), w.window.pixels());
+  ASSERT_LT(Filler<uint8_t>(9).run(), w.window.pixels());
   expect_filled(w, true);
 }
 
@@ -367,7 +367,8 @@ TEST(FillSamples, TakesEveryStepthPixel) {
         uint8_t* const out[3] = {r.data(), gr.data(), b.data()};
         std::vector<uint8_t> reach(c.reference.pixels());
         for (auto& most : reach) most = static_cast<uint8_t>(rng() % 256);
-        fill_samples(c.reference, bits.data(), c.x().data(), gain, reach.data(), step, out);
+        fill_samples(c.reference, bits.data(), c.x().data(), gain, reach.data(), {0, height, step},
+                     out);
         for (size_t i = 0; i < count; ++i) {
           const size_t p = i / cols * static_cast<size_t>(step) * static_cast<size_t>(width) +
                            i % cols * static_cast<size_t>(step);
@@ -383,6 +384,15 @@ TEST(FillSamples, TakesEveryStepthPixel) {
 
 // ---- Light ----
 
+// The gain after all rounds.
+Gain refined(const Case& c, Gain gain, int step) {
+  for (int round = 0; round < kGainRounds; ++round)
+    if (!refine_gain(gain_sums(c.reference, c.x().data(), gain, {0, c.reference.height, step}),
+                     &gain))
+      break;
+  return gain;
+}
+
 TEST(RefineGain, IsTheGainOfWhatFits) {
   std::mt19937 rng(37);
   for (float g : {0.5f, 0.8f, 1.0f, 1.25f})
@@ -391,7 +401,7 @@ TEST(RefineGain, IsTheGainOfWhatFits) {
       const Case c(160, 120, rng, g);
       // Off by some per cent, as the coarse grid leaves it.
       const Gain before = {g * 1.03f, g * 0.97f, g * 1.02f};
-      const Gain found = refine_gain(c.reference, c.x().data(), before, step);
+      const Gain found = refined(c, before, step);
       for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(found[k] / g, 1, 0.01) << g << " step " << step;
     }
 }
@@ -403,19 +413,19 @@ TEST(RefineGain, StaysWhereTooLittleFits) {
     for (auto& sample : plane) sample = static_cast<uint8_t>(rng() % 256);
   std::fill(c.reference.threshold.begin(), c.reference.threshold.end(), uint8_t{12});
   const Gain before = {0.8f, 0.9f, 1.1f};
-  EXPECT_EQ(refine_gain(c.reference, c.x().data(), before, 1), before);
+  EXPECT_EQ(refined(c, before, 1), before);
   // Black against black says nothing of light.
   for (size_t k = 0; k < 3; ++k) {
     std::fill(c.frame[k].begin(), c.frame[k].end(), uint8_t{0});
     std::fill(c.reference.level[k].begin(), c.reference.level[k].end(), uint8_t{0});
   }
-  EXPECT_EQ(refine_gain(c.reference, c.x().data(), before, 1), before);
+  EXPECT_EQ(refined(c, before, 1), before);
   // White is clipped.
   for (size_t k = 0; k < 3; ++k) {
     std::fill(c.frame[k].begin(), c.frame[k].end(), uint8_t{255});
     std::fill(c.reference.level[k].begin(), c.reference.level[k].end(), uint8_t{255});
   }
-  EXPECT_EQ(refine_gain(c.reference, c.x().data(), kSameLight, 1), kSameLight);
+  EXPECT_EQ(refined(c, kSameLight, 1), kSameLight);
 }
 
 TEST(RefineGain, OneStepOfLightInOnePixelIsEnough) {

@@ -79,7 +79,8 @@ TEST(SharedChroma, HasTheProductsOfAllPixels) {
           constexpr int kCapacity = 19;
           Frames frames({width, height, 2, rows}, kCapacity);
           Pool pool(threads);
-          SlidingGram gram(kCapacity, frames.shape, &pool, kernel), plain(kCapacity, &pool, kernel);
+          SlidingGram gram(kCapacity, frames.shape, 8, &pool, kernel),
+              plain(kCapacity, &pool, kernel);
           // More at once than are multiplied together, and past the end of the ring.
           for (int group : {1, 3, 18, 2}) {
             for (int i = 0; i < group; ++i) frames.append(group == 3);
@@ -93,7 +94,7 @@ TEST(SharedChroma, HasTheProductsOfAllPixels) {
 TEST(SharedChroma, InSlicesOfRows) {
   Frames frames({301, 75, 2, 2}, 6);
   Pool pool(2);
-  SlidingGram gram(6, frames.shape, &pool), plain(6);
+  SlidingGram gram(6, frames.shape, 8, &pool), plain(6);
   for (int turn = 0; turn < 3; ++turn) {
     for (int i = 0; i < 4; ++i) frames.append(false);
     for (int first = 0; first < 38;) {
@@ -109,7 +110,7 @@ TEST(SharedChroma, InSlicesOfRows) {
 TEST(SharedChroma, MoreThreadsLater) {
   Frames frames({640, 361, 2, 2}, 5);
   Pool pool(1);
-  SlidingGram gram(5, frames.shape, &pool), plain(5);
+  SlidingGram gram(5, frames.shape, 8, &pool), plain(5);
   for (int threads : {1, 3, 2}) {
     pool.resize(threads);
     for (int i = 0; i < 5; ++i) frames.append(false);

@@ -56,10 +56,11 @@ TEST(SharedStore, HasAllThatBelongsToAFrame) {
                                    plain.samples().plane(other, c)));
           }
         }
-        ASSERT_EQ(shared.alpha(slot) == nullptr, plain.alpha(other) == nullptr);
+        ASSERT_EQ(bool(shared.alpha(slot)), bool(plain.alpha(other)));
         if (shared.alpha(slot)) {
-          ASSERT_TRUE(std::equal(shared.alpha(slot), shared.alpha(slot) + plain.window().pixels(),
-                                 plain.alpha(other)));
+          ASSERT_TRUE(std::equal(shared.alpha(slot).high,
+                                 shared.alpha(slot).high + plain.window().pixels(),
+                                 plain.alpha(other).high));
         }
       }
     }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/foreground/picture.h"
 #include "tests/core/engine_util.h"
 #include "tests/core/mask_util.h"
 #include "tests/core/simd_targets.h"
@@ -500,7 +501,7 @@ TEST(SoftMask, IsNeverDarkerThanAMark) {
                      255};
   task.soft = true;
   PackedPicture picture(256, 1, 3);
-  write_output(task, picture.out(), 0, 1);
+  write_picture(task, {}, picture.out(), 0, 1);
   for (size_t p = 0; p < 256; ++p) ASSERT_EQ(picture.at(1, p), std::max<size_t>(p, 127));
 }
 

@@ -138,7 +138,7 @@ std::vector<double> scores(const LabelledClip& clip, const std::vector<DecisionC
   model.make_room(pixels, true);
   size_t frame = 0;
   watch(clip, [&](const Seen& seen, bool rehearsal) {
-    model.freeze_as(seen.level, &seen.limits, pixels);
+    model.freeze_as({8, {seen.level[0], seen.level[1], seen.level[2]}, {}}, &seen.limits, pixels);
     model.set_time(0);
     const auto decide = [&](size_t i) {
       decisions[i]->decide({{seen.x[0].data(), seen.x[1].data(), seen.x[2].data()},

@@ -35,7 +35,7 @@ Learnt any_learnt(fuzz::Bytes* bytes) {
     for (uint8_t& sample : samples) sample = bytes->byte();
     return samples;
   };
-  for (auto& level : learnt.level) level = plane();
+  for (auto& level : learnt.picture.level) level = plane();
   if (bytes->once_in(2)) learnt.limits = plane();
   if (bytes->once_in(2)) {
     auto& earlier = learnt.earlier.emplace();

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/gram/window.h"
+#include "core/planes/snapshot_range.h"
 
 namespace qdmd::stability {
 

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "core/base/channels.h"
-#include "core/gram/window.h"
 #include "core/learn/robust/stable_frames.h"
 #include "core/passes/median_block.h"
+#include "core/planes/chroma_shape.h"
 
 namespace qdmd {
 

@@ -79,20 +79,15 @@ void RobustLearner::mend(const std::vector<int>& cells, const StandingLooks& loo
   calm_ = 0;
   model->freeze_but_for_light(frame.t);
   replace(cells, looks, lit, model);
-  if (options_.low_bits() > 0) replace_deep(cells, lit, model);
+  if (options_.depth > 8) replace_deep(cells, lit, model);
 }
 
-// The same of whole samples.
+// replace() with whole samples.
 void RobustLearner::replace_deep(const std::vector<int>& cells, const LitFrames& lit,
                                  BackgroundModel* model) const {
-  const SnapshotRange frames = room_.frames->whole(lit.frames);
+  const SnapshotRange& frames = lit.frames;
   const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
-  const double unit = 1.0 / (1 << frames.low_bits());
-  const auto sample_of = [&](int t, int c, size_t pixel) {
-    uint8_t high, low;
-    return *read_samples(frames, t, c, pixel, 1, &high) << frames.low_bits() |
-           *read_low_samples(frames, t, c, pixel, 1, &low);
-  };
+  const double unit = 1.0 / (1 << bits_below(frames.depth()));
   for (int cell : cells) {
     const int row = cell / grid_.cols, col = cell % grid_.cols;
     for (int y = grid_.top(row); y < grid_.top(row + 1); ++y)
@@ -106,7 +101,7 @@ void RobustLearner::replace_deep(const std::vector<int>& cells, const LitFrames&
           for (int t = 0; t < frames.size(); ++t) {
             const Gain& light = lit.at[static_cast<size_t>(t)].light;
             const double sample =
-                sample_of(t, c, p) / static_cast<double>(light[static_cast<size_t>(c)]);
+                read_sample(frames, t, c, p) / static_cast<double>(light[static_cast<size_t>(c)]);
             int at = t;
             for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
             samples[at] = sample;

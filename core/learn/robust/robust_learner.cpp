@@ -124,9 +124,9 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
       static_cast<uint64_t>(window_size) * sizeof(Gain);
   // A scene that was left: levels and limits, and the same once more for windows to come. Where it
   // is back, there are two for a moment.
-  const uint64_t digits = options_.low_bits() > 0 ? 2 : 1;
+  const auto of_sample = static_cast<uint64_t>(sample_bytes(options_.depth));
   const uint64_t scene =
-      models == Models::two_of_live ? pixels() * ((1 + digits) * kChannels + 2) : 0;
+      models == Models::two_of_live ? pixels() * ((1 + of_sample) * kChannels + 2) : 0;
   const uint64_t made =
       (models == Models::one ? 1 : 2) *
       (BackgroundModel::bytes(pixels(), window_size, most_pictures(dmd, window_size), true) +
@@ -139,7 +139,8 @@ uint64_t RobustLearner::bytes(int window_size, int, Models models, int threads) 
                                              pixels() + blur_bytes(reference_.width, threads)});
   const uint64_t masks = workers * mask_scratch_bytes(grid_.width, grid_.height) +
                          WindowMask::scratch_bytes(pixels(), threads);
-  const uint64_t filling = workers * Filler::bytes(window_size, options_.low_bits() > 0);
+  const uint64_t filling = workers * (options_.depth > 8 ? Filler<uint16_t>::bytes(window_size)
+                                                         : Filler<uint8_t>::bytes(window_size));
   return kept + made + scene +
          std::max({start, masks, scene,
                    decomposition_bytes(options_.dmd, static_cast<double>(samples_at(finest_step_)),
@@ -410,19 +411,13 @@ Decomposition RobustLearner::decompose_filled(const SnapshotRange& snapshots) {
 }
 
 // The modes' pictures from filled frames, run by run.
-void RobustLearner::combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model) {
-  const SnapshotRange whole = room_.frames->whole(snapshots);
-  std::vector<Filler> fillers;
-  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size(), deep);
+template <typename Sample>
+void RobustLearner::combine(const SnapshotRange& snapshots, BackgroundModel* model) {
+  std::vector<Filler<Sample>> fillers;
+  for (size_t i = 0; i < room_.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
   const size_t run = fillers[0].run();
   room_.pool->run((pixels() + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, pixels() - first);
-    if (deep) {
-      model->build_from(
-          fillers[worker].fill_deep(whole, gains_, mask_, reference_, reach_.data(), first, count),
-          first, count);
-      return;
-    }
     model->build_from(
         fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
         first, count);
@@ -501,14 +496,17 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
       const Decomposition decomposition = decompose_filled(snapshots);
       facts_.dmd = decomposition.summary;
       divide_time(stride_, &facts_.dmd);
-      const bool deep = options_.low_bits() > 0 && iteration + 1 == options_.iterations;
+      const bool deep = options_.depth > 8 && iteration + 1 == options_.iterations;
       // Where all is so dark that its highest bits are 0, they have no mode.
       const bool dark = deep && facts_.dmd.background_modes == 0;
-      model->begin(snapshots, dark ? mean_of_frames(snapshots.size()) : decomposition.background,
-                   true);
+      model->begin_from(snapshots.size(), snapshots.pixels(),
+                        dark ? mean_of_frames(snapshots.size()) : decomposition.background);
       model->set_stride(stride_);
       model->make_steady();
-      combine(snapshots, deep, model);
+      if (deep)
+        combine<uint16_t>(snapshots, model);
+      else
+        combine<uint8_t>(snapshots, model);
       take_reference(model, snapshots_->size() / 2);
     }
     end(model);

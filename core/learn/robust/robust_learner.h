@@ -64,7 +64,7 @@ class RobustLearner : public Learner {
   static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
 
   FrameContents contents() const override {
-    FrameContents contents = {1, parameters_.cells_along, 1, 1, options_.low_bits()};
+    FrameContents contents = {1, parameters_.cells_along, 1, 1, options_.depth};
     if (options_.keeps_shared()) {
       contents.chroma_columns = options_.chroma_columns;
       contents.chroma_rows = options_.chroma_rows;
@@ -132,7 +132,8 @@ class RobustLearner : public Learner {
   void recall_spread(std::vector<uint8_t>* spread) const;
   void find_foreground(const SnapshotRange& snapshots);
   Decomposition decompose_filled(const SnapshotRange& snapshots);
-  void combine(const SnapshotRange& snapshots, bool deep, BackgroundModel* model);
+  template <typename Sample>
+  void combine(const SnapshotRange& snapshots, BackgroundModel* model);
   void take_reference(BackgroundModel* model, double t);
   std::vector<Gain> gains_of_frames();
   void keep_some();

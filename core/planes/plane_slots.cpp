@@ -1,8 +1,10 @@
-#include "core/gram/window.h"
+#include "core/planes/plane_slots.h"
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
+
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 namespace {
@@ -14,22 +16,23 @@ size_t padded(size_t pixels) { return (pixels + kAlignment - 1) / kAlignment * k
 
 }  // namespace
 
-uint64_t PlaneSlots::bytes(int capacity, size_t pixels, size_t chroma_samples) {
+uint64_t PlaneSlots::bytes(int capacity, size_t pixels, size_t chroma_samples, int depth) {
   uint64_t slot = 0, bytes = 0;
   if (__builtin_mul_overflow(2, padded(chroma_samples), &slot) ||
       __builtin_add_overflow(slot, padded(pixels), &slot) ||
-      __builtin_mul_overflow(static_cast<uint64_t>(capacity), slot, &bytes))
+      __builtin_mul_overflow(static_cast<uint64_t>(capacity * sample_bytes(depth)), slot, &bytes))
     return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
 
-PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples)
+PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth)
     : capacity_(capacity),
+      depth_(depth),
       pixels_(pixels),
       plane_size_(padded(pixels)),
       chroma_samples_(chroma_samples),
       chroma_size_(padded(chroma_samples)),
-      reserved_(bytes(capacity, pixels, chroma_samples)),
+      reserved_(bytes(capacity, pixels, chroma_samples, depth)),
       data_(static_cast<uint8_t*>(take_large(reserved_)), GiveBackLarge{reserved_}) {}
 
 void PlaneSlots::take_pages(int slot, Pool* pool) {
@@ -48,32 +51,18 @@ void PlaneSlots::take_pages(int slot, Pool* pool) {
 }
 
 void PlaneSlots::pad(int slot) {
-  std::memset(plane(slot, 0) + pixels_, 0, plane_size_ - pixels_);
-  for (int c = 1; c < kChannels; ++c)
-    std::memset(plane(slot, c) + chroma_samples_, 0, chroma_size_ - chroma_samples_);
+  for (int c = 0; c < kChannels; ++c) {
+    const size_t samples = c == 0 ? pixels_ : chroma_samples_,
+                 size = c == 0 ? plane_size_ : chroma_size_;
+    const MutableSamples plane = this->samples(slot, c);
+    for (uint8_t* digits : {plane.high, plane.low})
+      if (digits) std::memset(digits + samples, 0, size - samples);
+  }
 }
 
 void PlaneSlots::resize(size_t pixels) {
   pixels_ = chroma_samples_ = pixels;
   plane_size_ = chroma_size_ = padded(pixels);
-}
-
-Window Window::unshared() const {
-  Window window(capacity(), pixels());
-  window.oldest_ = oldest_;
-  window.size_ = size_;
-  return window;
-}
-
-int Window::append(Pool* pool) {
-  if (size_ == capacity()) {
-    oldest_ = (oldest_ + 1) % capacity();
-    --size_;
-  }
-  const int newest = slot(size_++);
-  take_pages(newest, pool);
-  pad(newest);
-  return newest;
 }
 
 }  // namespace qdmd

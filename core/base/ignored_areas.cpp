@@ -1,4 +1,4 @@
-#include "core/foreground/ignored.h"
+#include "core/base/ignored_areas.h"
 
 #include <algorithm>
 #include <cstring>

@@ -45,9 +45,9 @@ class IgnoredAreas {
   }
   // Sets to 0 what is ignored of `count` samples of row y, from column `left` on.
   void clear(int y, int left, int count, uint8_t* samples) const;
-  // The same of samples first .. first + count - 1 of pictures that are `width` pixels wide.
+  // clear() of samples first .. first + count - 1 of pictures that are `width` pixels wide.
   void clear_run(size_t first, size_t count, int width, uint8_t* samples) const;
-  // The same of whole rows first_row .. first_row + row_count - 1.
+  // clear() of whole rows first_row .. first_row + row_count - 1.
   void clear_rows(int first_row, int row_count, int width, uint8_t* picture) const;
 
  private:
