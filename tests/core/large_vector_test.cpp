@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/parallel/pool.h"
 #include "core/planes/snapshot_range.h"
 
 namespace qdmd::test {

@@ -97,14 +97,14 @@ Score separate(const char* text, const DmdOptions& dmd, uint64_t seed) {
   for (Engine* engine : {&backgrounds, &masks}) EXPECT_TRUE(engine->drain().ok());
   double hits = 0, objects = 0, alarms = 0;
   for (size_t t = 0; t < kFrames; ++t) {
-    EXPECT_TRUE(backgrounds.ready() && masks.ready());
+    EXPECT_TRUE(backgrounds.next() && masks.next());
     Picture picture(kWidth, kHeight);
-    backgrounds.pop(Output::background, view_of<uint8_t>(picture));
+    backgrounds.next()->pop(Output::background, view_of<uint8_t>(picture));
     const double error = mean_difference(picture, truths[t]);
     score.background += error / kFrames;
     background_squares += squared_difference(picture, truths[t]);
     score.worst = std::max(score.worst, error);
-    masks.pop(Output::mask, view_of<uint8_t>(picture));
+    masks.next()->pop(Output::mask, view_of<uint8_t>(picture));
     for (size_t p = 0; p < labels[t].samples.size(); ++p) {
       const uint8_t label = labels[t].samples[p];
       const bool marked = picture.samples[3 * p] != 0;
