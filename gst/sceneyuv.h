@@ -13,7 +13,7 @@ namespace qdmd {
 // that of the mean colour of the pixels that share it.
 class SceneYuv {
  public:
-  // Of frames of Y, U, V or grey, of 8 to 16 bits.
+  // For frames of Y, U, V or grey, of 8 to 16 bits.
   explicit SceneYuv(const GstVideoInfo& info);
 
   // row(y): 3 width samples of R, G and B, each of which may be overwritten by the next call.

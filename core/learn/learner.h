@@ -62,7 +62,7 @@ class Learner {
 
   // ---- What it needs ----
 
-  // Of each frame, beside its planes.
+  // What is kept of each frame, beside its planes.
   virtual FrameContents contents() const = 0;
   // The steps that it can sample pixels with, the finest first: it begins with that.
   virtual std::vector<int> sample_steps() const = 0;
@@ -94,7 +94,7 @@ class Learner {
   virtual void recall(const Learnt& /*learnt*/) {}
   // True where models have limits.
   virtual bool makes_limits() const { return false; }
-  // Of the solves to come: one of sample_steps(). Not while one runs.
+  // Sets the step of the solves to come: one of sample_steps(). Not while one runs.
   virtual void set_sample_step(int) {}
 
   // The inner products of the newest `frames` snapshots of `span` with all of it. Slices of a group
@@ -105,7 +105,7 @@ class Learner {
   virtual void decompose(const SnapshotRange& snapshots) = 0;
   // Makes `model` the snapshots' background; slices come in order.
   virtual void build(Slice slice, BackgroundModel* model) = 0;
-  // Of the newest model that was built whole.
+  // What is known of the newest model that was built whole.
   virtual SolveFacts facts() const = 0;
   // What follows the frames as they come may leave out solves: one of so many hops is enough, as
   // the newest solves found hardly anything new. Not while one runs.
@@ -152,7 +152,7 @@ class Learner {
   virtual bool follows_light() const { return false; }
   // The background in use is this picture now, which no window made. Not while a solve runs.
   virtual void follow(const std::vector<uint8_t> /*level*/[kChannels]) {}
-  // Of the frame in `slot`, over the background in use.
+  // The light of the frame in `slot`, over the background in use.
   virtual Gain light(int /*slot*/) { return kSameLight; }
 };
 

@@ -24,7 +24,7 @@ struct Progress {
 
 // Beside the first output.
 std::string progress_of(const std::string& path);
-// Of a file that is not there: none. Throws std::runtime_error where the file is something else.
+// Nothing where there is no such file. Throws std::runtime_error where the file is something else.
 std::optional<Progress> read_progress(const std::string& path);
 void write_progress(const std::string& path, const Progress& progress);
 

@@ -57,7 +57,7 @@ CharsPtr text_of(const GstVideoColorimetry& colours) {
   return CharsPtr(gst_video_colorimetry_to_string(&colours));
 }
 
-// Of pictures of the size and colours of `info`, in frames of that format.
+// What pictures of the size and colours of `info` are, in frames of that format.
 GstVideoInfo picture_info(const GstVideoInfo& info, GstVideoFormat format) {
   GstVideoInfo picture;
   gst_video_info_set_format(&picture,
@@ -194,7 +194,7 @@ FrameReader::FrameReader(std::vector<std::string> paths, double rate,
 
 FrameReader::~FrameReader() {
   frame_.reset();
-  // Its threads look at the crop.
+  // The pipeline's threads look at the crop.
   pipeline_.reset();
 }
 

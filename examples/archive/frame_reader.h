@@ -18,7 +18,7 @@ namespace qdmd::archive {
 struct RecordingInfo {
   int width = 0, height = 0;  // pixels
   double rate = 0;            // frames a second
-  // Of pictures that are made of its frames: I420, Y42B, Y444, GRAY8 or RGB.
+  // The format of pictures that are made of its frames: I420, Y42B, Y444, GRAY8 or RGB.
   GstVideoInfo picture = {};
 };
 
@@ -42,14 +42,14 @@ class FrameReader {
 
   // The next frame; false at the end.
   bool next();
-  // Of it: the rows that are wanted, good until the next call; and when it is shown, in nanoseconds
+  // The rows of it that are wanted, good until the next call; and when it is shown, in nanoseconds
   // from the first one.
   ImageView view() const;
   GstClockTime time() const { return time_; }
   // The share of the recording that was read, 0 .. 1, about.
   double share() const;
   const RecordingInfo& info() const { return info_; }
-  // Of each file that was read to an end long before the one that it names, a sentence.
+  // A sentence for each file that was read to an end long before the one that it names.
   const std::vector<std::string>& early_ends() const { return early_ends_; }
 
  private:

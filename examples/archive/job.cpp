@@ -353,7 +353,7 @@ class Job {
     line_.end();
   }
 
-  // Of all processes, by the first.
+  // The values of all processes, by the first.
   std::vector<double> of_all(double value) const {
     return team_ ? team_->collect(value) : std::vector<double>{value};
   }
@@ -378,7 +378,7 @@ class Job {
     const auto in_seconds = [](const timeval& time) {
       return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
     };
-    // Of all threads, but for what is spent on waiting for others.
+    // The time of all threads, but for what is spent on waiting for others.
     add("processor-seconds", in_seconds(usage.ru_utime) + in_seconds(usage.ru_stime) -
                                  (team_ ? team_->processor_seconds() : 0));
     add("most-memory", static_cast<double>(usage.ru_maxrss) * 1024);

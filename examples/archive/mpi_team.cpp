@@ -53,7 +53,7 @@ class MpiTeam::Call {
 };
 
 bool MpiTeam::is_job() {
-  // Of Open MPI, of any PMIx (Slurm), of PMI (Slurm, MPICH).
+  // What Open MPI sets, any PMIx (Slurm), and PMI (Slurm, MPICH).
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"})
     if (std::getenv(name)) return true;
   return false;

@@ -53,7 +53,8 @@ class MpiTeam : public Team {
   uint64_t received(Traffic traffic) const { return received_[static_cast<size_t>(traffic)]; }
   // Seconds that it has talked, or waited for others to.
   double seconds() const { return seconds_; }
-  // Those of them that it spent on a processor: MPI asks again and again whether others have come.
+  // The seconds of those that it spent on a processor: MPI asks again and again whether others have
+  // come.
   double processor_seconds() const { return processor_seconds_; }
 
  private:

@@ -14,7 +14,7 @@ namespace qdmd::archive {
 // share a sample, they begin and end with samples, or with the picture.
 class Picture {
  public:
-  // Of the format and colours of `like`.
+  // A picture in the format and colours of `like`.
   Picture(const GstVideoInfo& like, int width, int height);
   Picture(const Picture&) = delete;
   Picture& operator=(const Picture&) = delete;
@@ -22,13 +22,13 @@ class Picture {
   // The samples, to be written.
   MutableImageView view() { return mapped_->view<uint8_t>(); }
   int planes() const { return static_cast<int>(GST_VIDEO_INFO_N_PLANES(&info_)); }
-  // Of one plane, with the bytes between its rows.
+  // Rows of one plane, with the bytes between them.
   std::span<uint8_t> rows(int plane, int first, int end);
   // Bytes of a plane that lie before row `end`.
   size_t bytes_before(int plane, int end) const;
   // All planes.
   std::span<const uint8_t> all() const { return bytes_; }
-  // Of a mask: its bytes, without gaps between rows.
+  // Copies a mask: its bytes, without gaps between rows.
   void copy(const uint8_t* mask);
 
  private:
@@ -37,7 +37,7 @@ class Picture {
   std::optional<MappedVideoFrame> mapped_;
 };
 
-// Of masks of such pictures: a byte a pixel.
+// What masks of such pictures are: a byte a pixel.
 GstVideoInfo mask_info(const GstVideoInfo& picture);
 
 }  // namespace qdmd::archive

@@ -34,7 +34,7 @@ void push(const PipelinePtr& pipeline, const ElementPtr& source, GstBuffer* buff
   throw std::runtime_error(what);
 }
 
-// Of all that the encoder takes, what loses nothing of such frames and adds nothing to them. What
+// What loses nothing of such frames and adds nothing to them, of all that the encoder takes. What
 // others like best, they know.
 std::string taken_by(const std::string& encoder, const GstVideoInfo& info) {
   const bool is_rgb = GST_VIDEO_INFO_IS_RGB(&info), is_grey = GST_VIDEO_INFO_IS_GRAY(&info);

@@ -14,8 +14,8 @@ namespace qdmd::archive {
 // One Matroska file, or one PNG picture. Throws std::runtime_error with a sentence for the user.
 class VideoWriter {
  public:
-  // Of frames like `info`, `rate` a second. encoder: elements of GStreamer between raw video and
-  // the file.
+  // Writes frames like `info`, `rate` a second. encoder: elements of GStreamer between raw video
+  // and the file.
   VideoWriter(const std::string& path, const GstVideoInfo& info, double rate,
               const std::string& encoder);
 

@@ -36,8 +36,8 @@ class Absorbed {
 
   bool any() const { return any_; }
   bool has(int cell) const { return since_[static_cast<size_t>(cell)] != kNever; }
-  // Of looks with these numbers, in order. What earlier windows showed does not count where they
-  // ended before it was absorbed.
+  // Which looks count, of those with these numbers, in order. What earlier windows showed does not
+  // count where they ended before it was absorbed.
   FirstLooks first_looks(const std::vector<int64_t>& numbers) const {
     FirstLooks result = {std::vector<uint16_t>(since_.size()), std::vector<uint8_t>(since_.size())};
     for (size_t cell = 0; cell < since_.size(); ++cell) {

@@ -16,7 +16,7 @@ constexpr double kShared = 0.1;
 // No colour says more than this, as a logarithm: those that are seldom seen would.
 constexpr double kMostSaid = 3;
 
-// Of cells within kPatchRadius along a line of `count` that are `step` apart: sums.
+// Sums over the cells within kPatchRadius, along a line of `count` that are `step` apart.
 void add_along(const float* from, size_t step, int count, float* out) {
   for (int i = 0; i < count; ++i) {
     float sum = 0;

@@ -23,8 +23,8 @@ class ClutterColours {
   static uint64_t bytes(const Grid& grid, uint64_t looks, int threads);
 
   // True where much of what frames show is unlike the background, and moves: few frames share it.
-  // Of another scene, many do. from: of each cell the frame whose look is taken for the background;
-  // density: of looks, PatchFrames::density().
+  // Many frames share another scene. from: of each cell the frame whose look is taken for the
+  // background; density: of looks, PatchFrames::density().
   bool hides_much(std::span<const float> density, const std::vector<int>& from) const;
   // The colours of the background, and of what is unlike it.
   void learn(const std::vector<int>& from);
@@ -35,7 +35,7 @@ class ClutterColours {
  private:
   static constexpr int kSteps = 8, kColours = kSteps * kSteps * kSteps;
   static int colour_of(const float* const look[3], size_t cell);
-  // Of a look, by cells: logarithms, in two rooms of as many numbers.
+  // Finds a look's logarithms, by cells, in two rooms of as many numbers.
   void find_logarithms(int look, float* room, float* out) const;
 
   Grid grid_;

@@ -5,7 +5,7 @@
 namespace qdmd {
 namespace {
 
-// Of `theirs` parts of a length, the one that the middle of part k of `ours` lies in.
+// The part, of `theirs` of a length, in which the middle of part k of `ours` lies.
 int middle_in(int k, int ours, int theirs) {
   return static_cast<int>((2 * int64_t{k} + 1) * theirs / (2 * int64_t{ours}));
 }

@@ -17,7 +17,7 @@ class FrameMemory {
   // Takes all memory.
   FrameMemory(int capacity, const ChromaShape& shape, const Grid& grid);
   static uint64_t bytes(int capacity, const ChromaShape& shape, const Grid& grid);
-  // Those that it takes more, for a moment, where pixels share no samples any more.
+  // The bytes that it takes more, for a moment, where pixels share no samples any more.
   static uint64_t bytes_to_unshare(int capacity, const ChromaShape& shape) {
     return shape.is_shared() ? PlaneSlots::bytes(capacity, shape.pixels()) : 0;
   }

@@ -149,7 +149,7 @@ class FramesOfLight {
     for (size_t i = 0; i < (pool ? pool->threads() : 1); ++i) scratch_.emplace_back(cells());
   }
 
-  // Of each frame by itself, over the median of all.
+  // The gain of each frame by itself, over the median of all.
   std::vector<Gain> over_median() {
     std::vector<Gain> gains(count_, kSameLight);
     // The second reference is sharper where light changed.

@@ -18,7 +18,7 @@ void median_picture(const Grid& grid, const Band& band, const StableFrames& stab
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
-    // Of the rows that are kept.
+    // Rows are counted among those that are kept.
     const int top = std::max(grid.top(row) - band.first(), 0),
               bottom = std::min(grid.top(row + 1) - band.first(), band.rows());
     if (top >= bottom) return;

@@ -48,7 +48,7 @@ Limits limits_of_spreads(int spreads, int least) {
   return limits;
 }
 
-// Of frames that are one frame apart, from one of frames that are `stride` apart.
+// Makes a summary of frames that are `stride` apart one of frames that follow each other.
 void divide_time(int stride, DmdSummary* summary) {
   summary->omega /= stride;
   summary->lambda = std::polar(std::pow(std::abs(summary->lambda), 1.0 / stride),
@@ -517,7 +517,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
   facts_.solve_time = room_.clock->spent().since(before).of_solves();
 }
 
-// Of all frames of the window: those between the snapshots have a light of their own.
+// The gains of all frames of the window: those between the snapshots have a light of their own.
 std::vector<Gain> RobustLearner::gains_of_frames() {
   if (stride_ == 1) return gains_;
   std::vector<int> lit;

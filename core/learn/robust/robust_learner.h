@@ -32,7 +32,7 @@ struct RobustParameters {
   // the mean of such samples is nearer to the background than what few frames show.
   int least_threshold = 26;
   int spreads = 4;
-  // The same of masks that users see: there, what differs a little may be somebody.
+  // The least threshold of masks that users see: there, what differs a little may be somebody.
   int least_limit = 12;
   // Samples within half a spread of the background, at least so many levels, count in full.
   int least_reach = 2;
@@ -51,8 +51,8 @@ struct RobustParameters {
 //   repeat   what differs from the picture is foreground (find_mask) and becomes background
 //            (Filler); Q-DMD of the filled window, of rank 1 unless another is asked for, with
 //            amplitudes fitted to all frames, is the next background
-// Of samples of more than 8 bits the start, masks and inner products see the highest eight; what is
-// filled and combined last has all bits.
+// Where samples have more than 8 bits, the start, masks and inner products see the highest eight;
+// what is filled and combined last has all bits.
 // Global changes of light are divided out before and put back in L(t). Inner products are taken
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
@@ -110,7 +110,7 @@ class RobustLearner : public Learner {
 
  private:
   size_t pixels() const { return reference_.pixels(); }
-  // Of kept frames.
+  // The shape of kept frames.
   ChromaShape shape() const {
     const FrameContents contents = this->contents();
     return {reference_.width, reference_.height, contents.chroma_columns, contents.chroma_rows};
@@ -123,7 +123,7 @@ class RobustLearner : public Learner {
     return models != Models::two_of_live && parameters_.earlier_share > 0;
   }
   uint64_t most_looks(int window_size, Models models) const;
-  // Of the first snapshot, counted like FrameStore::frames_taken().
+  // The number of the first snapshot, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - snapshots_->size(); }
   void start(const SnapshotRange& snapshots);
   void refine_light(const SnapshotRange& snapshots);
@@ -182,9 +182,9 @@ class RobustLearner : public Learner {
   int calm_ = 0;
   // Another scene was seen; and solves know of it, but no background yet.
   bool other_scene_ = false, scene_begins_ = false;
-  // Of the newest solve: its window, the share of it that no solve before had, of which every
-  // stride-th frame is a snapshot of the decomposition, frames that the start compared, and what it
-  // found.
+  // What belongs to the newest solve: its window, the share of it that no solve before had, of
+  // which every stride-th frame is a snapshot of the decomposition, frames that the start compared,
+  // and what it found.
   std::optional<SnapshotRange> snapshots_;
   float fresh_ = 1;
   int stride_ = 1;

@@ -22,7 +22,7 @@ struct Products {
   double aa = 0, bb = 0, ab = 0;
   size_t count = 0;
 
-  // Of four at a time, each has sums of its own: none waits for the one before.
+  // Four at a time have sums of their own: none waits for the one before.
   void add(const float* a, const float* b, size_t more) {
     constexpr size_t kLanes = 4;
     double lanes[3][kLanes] = {};

@@ -44,7 +44,7 @@ class SceneWatch {
   Grid grid_;
   size_t rows_ = 0, cols_ = 0;  // of blocks
   std::vector<float> blocks_;
-  // Of each channel and block, to the right and down; 0 at the borders.
+  // Edges of each channel and block, to the right and down; 0 at the borders.
   std::vector<float> background_, left_, frames_[kFrames];  // the newest ones, a ring
   int next_ = 0, strange_ = 0, returned_ = 0;               // the last two: frames in a row
   bool left_known_ = false;

@@ -102,7 +102,7 @@ bool add_recollection(size_t cells, PatchFrames* patches, int count, const Recol
   return true;
 }
 
-// Of each cell the look with the largest density, the first one of equals.
+// Each cell's look with the largest density, the first one of equals.
 std::vector<int> densest(std::span<const float> density, size_t cells, Pool* pool) {
   // Cells at a time: theirs stay in registers and in the first cache.
   constexpr size_t kTogether = 256;
@@ -140,7 +140,7 @@ void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
   }
 }
 
-// Of the room's steps.
+// The bytes of the room's steps.
 uint64_t steps_bytes(const Grid& grid, uint64_t looks) {
   return sizeof(uint16_t) *
          std::max(PatchFrames::steps_of(grid, looks), patch_distance_steps(grid, looks));

@@ -16,7 +16,7 @@ constexpr int kLook = 0, kNext = 1, kBefore = 2;
 // Cells that are followed together: plain loops, which the compiler makes vectors of.
 constexpr size_t kTogether = 64;
 
-// Of cells `first` and those after it.
+// The planes of cell `first` and of those after it.
 struct Planes {
   const float *red, *green, *blue;
   Planes(const float* const of[3], size_t first)

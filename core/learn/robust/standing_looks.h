@@ -35,7 +35,7 @@ class StandingLooks {
   void forget();
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number);
-  // Of a cell whose look is known.
+  // The look of a cell, where it is known.
   float level(int cell, int channel) const { return looks_.plane(0, channel)[cell]; }
   // The frame with which its look came. What was hidden for no longer than it had been there goes
   // on to be what it was.
@@ -82,7 +82,7 @@ class StandingLooks {
   Grid grid_;
   GridFrames looks_;  // what it shows, what may become the next look, and the one before
   std::vector<Cell> cells_;
-  // Of each cell: how many frames showed its look, and what may become the next one; 0: there is
+  // By cells: how many frames showed the look, and what may become the next one; 0: there is
   // none.
   std::vector<int> frames_, next_frames_;
   int64_t number_ = 0, previous_ = 0;  // of the newest frame, and of the one before

@@ -22,7 +22,7 @@ struct Thinning {
     const int stride = stride_of(frames);
     return (frames + stride - 1) / stride;
   }
-  // Of windows that grow up to this size.
+  // The most snapshots of windows that grow up to this size.
   int most_snapshots(int window_size) const {
     int most = 0;
     for (int frames = 1; frames <= window_size; ++frames)
