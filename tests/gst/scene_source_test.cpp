@@ -427,8 +427,8 @@ TEST(SceneSource, EffectsAddToTheScene) {
 TEST(SceneSource, WrongTextsAreErrorsThatListWhatIsAllowed) {
   const struct {
     const char *properties, *names;
-  } cases[] = {{"scene=fog", "jitter"},
-               {"effects=fog", "illumination-changes"},
+  } cases[] = {{"scene=haze", "jitter"},
+               {"effects=haze", "illumination-changes"},
                {"effects=noise=loud", "from 0 to 60 levels"},
                {"effects=noise=-1", "from 0 to 60 levels"},
                {"effects=noise=2:colour=3", "gain"}};
