@@ -41,7 +41,7 @@ FLAGS = -std=c++20 -O2 -ffp-contract=off -I. -isystem $build/root/usr/include -i
 SOURCES = \$(shell git grep -L opencv2/ 'core/*.cpp' ':!core/library' ':!core/metrics')
 OBJECTS = \$(SOURCES:%.cpp=$build/%.o)
 .PRECIOUS: $build/%.o
-$build/%_test: $build/tests/core/%_test.o $build/core.a
+$build/%_test: $build/tests/core/%_test.o $build/tests/core/test_util.o $build/core.a
 	\$(CXX) \$^ -o \$@ -L$libraries -Wl,--unresolved-symbols=ignore-all -lgtest_main -lgtest -lhwy -pthread
 $build/core.a: \$(OBJECTS)
 	rm -f \$@; aarch64-linux-gnu-ar rcs \$@ \$^

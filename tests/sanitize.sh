@@ -23,6 +23,7 @@ short() {
   local kind=$1 name=$2 folder=build-sanitize/$2 file
   shift 2
   mkdir -p "$folder"
+  rm -f "$folder"/*.o
   echo "== $name: $kind"
   for file in "$@"; do
     echo "$file" "$folder/${file//\//_}.o"
@@ -113,6 +114,6 @@ fi
 slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
 flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
 short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread,workers}_test.cpp
-short address,undefined kernels core/gram/{tile_kernel,kernel,gram,window,block_sums,shared_chroma}.cpp \
+short address,undefined kernels core/gram/{tile_kernel,kernel,gram,block_sums,shared_chroma}.cpp core/planes/plane_slots.cpp \
   core/base/large_vector.cpp core/passes/{chroma,combine,digits,fill,median_rows,planes,read_samples,residual,window_mask}.cpp core/parallel/pool.cpp \
   tests/core/{gram,kernel,passes,chroma,digits,combine,shared_chroma}_test.cpp
