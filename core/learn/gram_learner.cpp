@@ -18,7 +18,8 @@ constexpr size_t kPixelsPerPart = 16384;
 
 constexpr size_t kUnit = BackgroundModel::kSliceUnit;
 
-// Turns a summary in units of the lowest of so many bits into one in levels. Sensitivity is a ratio.
+// Turns a summary in units of the lowest of so many bits into one in levels. Sensitivity is a
+// ratio.
 void put_in_levels(int depth, DmdSummary* summary) {
   if (depth == 8) return;
   const double unit = 1.0 / (1 << bits_below(depth));
