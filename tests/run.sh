@@ -3,7 +3,7 @@
 # the sanitizers.
 #
 #   tests/run.sh          all of it: most of an hour where nothing is built yet
-#   tests/run.sh --fast   after each small change; its goal is two minutes where the rest is built:
+#   tests/run.sh --fast   after each small change, less than two minutes where the rest is built:
 #                         the formatting of changed files, and the tests of meson's suite `fast`
 #   tests/run.sh --help   prints this
 #
