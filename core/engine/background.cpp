@@ -34,23 +34,24 @@ void Background::forget() {
   state_ = State::learnt;
 }
 
-void Background::begin_scene() {
-  learner_->begin_scene();
+void Background::begin_scene(bool returns) {
+  learner_->begin_scene(returns);
   scene_begins_ = true;
+  scene_returns_ = returns;
 }
 
 void Background::begin_scene_at_once() {
-  begin_scene();
+  begin_scene(false);
   known_ = false;
   state_ = State::learnt;
 }
 
 void Background::return_to(const Learnt& learnt) {
-  begin_scene_at_once();
+  begin_scene(true);
   make_room();
   recall(learnt);
   show(learnt, State::held_in_light);
-  decision_.forget();
+  decision_.change_scene(true);
   scene_begins_ = false;
 }
 
@@ -160,7 +161,7 @@ void Background::decide(Comparison frame, const PlaneRows& x, Pool* pool) {
 void Background::publish() {
   newest_ = next();
   learner_->publish();
-  if (std::exchange(scene_begins_, false)) decision_.forget();
+  if (std::exchange(scene_begins_, false)) decision_.change_scene(scene_returns_);
   report_ = next_report_;
   known_ = true;
   state_ = State::learnt;

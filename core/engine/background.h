@@ -31,9 +31,9 @@ class Background {
   Learner& learner() { return *learner_; }
   // Forgets the model and what earlier windows showed.
   void forget();
-  // Learner::begin_scene(); masks begin anew with the next publish().
-  void begin_scene();
-  // As begin_scene(), and there is no background until that publish().
+  // Learner::begin_scene(); masks do so with the next publish().
+  void begin_scene(bool returns);
+  // As begin_scene() of a scene that nobody knows, and there is no background until that publish().
   void begin_scene_at_once();
   // The camera shows the scene of `learnt` again: its background is in use, in the light of each
   // frame. If it throws, nothing is known.
@@ -75,10 +75,11 @@ class Background {
   void hold(double t, State state);
   // Learner::mend(), of the L in use.
   void mend(const Learner::Compared& frame) { learner_->mend(frame, &model()); }
-  // Learner::look_ahead(), of the L in use. used: frames wait that it is the background of.
+  // Learner::look_ahead(), of the L in use. used: frames wait whose background it is.
   void look_ahead(const Learner::Compared& frame, bool used) {
-    const bool mends = known_ && used && state_ == State::learnt;
-    learner_->look_ahead(frame, mends ? &model() : nullptr);
+    Learner::Compared compared = frame;
+    compared.mends = used && state_ == State::learnt;
+    learner_->look_ahead(compared, known_ ? &model() : nullptr);
   }
   // Sets L to the light of the frame in `slot`, where the method has one.
   void follow_light(int slot);
@@ -110,7 +111,7 @@ class Background {
   std::optional<SnapshotRange> snapshots_;  // of the next
   SolveReport report_, next_report_;
   State state_ = State::learnt;
-  bool known_ = false, scene_begins_ = false;
+  bool known_ = false, scene_begins_ = false, scene_returns_ = false;
   uint64_t solves_ = 0;
   Wishes wishes_;
 };

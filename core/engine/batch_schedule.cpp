@@ -27,8 +27,7 @@ bool BatchSchedule::take_in(const ImageView& frame) {
   if (!take(frame)) return false;
   ++queue_.pending;
   ++collection_->not_added;
-  if (!collection_->freeze && scene_seen() != SceneSeen::same)
-    collection_->scene = std::max(collection_->begin, taken() - Learner::kSceneFrames);
+  if (!collection_->freeze) follow_scene();
   pace().count_frame();
   if (collected() == window_size_) {
     end_window(late_frames_ == 0);
@@ -44,6 +43,27 @@ bool BatchSchedule::take_in(const ImageView& frame) {
   return true;
 }
 
+// With the newest frame.
+void BatchSchedule::follow_scene() {
+  Collection& window = *collection_;
+  switch (scene_seen()) {
+    case SceneSeen::same:
+      return;
+    case SceneSeen::another:
+      window.scene = std::max(window.begin, taken() - Learner::kSceneFrames);
+      window.scene_returns = false;
+      return;
+    case SceneSeen::the_one_before:
+      // Something disturbed the picture for a moment.
+      if (window.scene && !window.scene_returns)
+        window.scene.reset();
+      else if (!window.scene)
+        window.scene = std::max(window.begin, taken() - Learner::kReturnFrames);
+      window.scene_returns = true;
+      return;
+  }
+}
+
 // With the newest frame: it may show what is behind the background of those that wait.
 void BatchSchedule::look_ahead() {
   const int count = std::min(frames().size(), Learner::kMendingFrames);
@@ -52,7 +72,8 @@ void BatchSchedule::look_ahead() {
   const auto learns = [](const auto& window) { return !window || window->state == State::learnt; };
   const bool used = next < shown_.end && !freeze() && !loaded_ && learns(waiting_) &&
                     learns(collection_) &&
-                    !(collection_ && (collection_->freeze || collection_->scene));
+                    !(collection_ && (collection_->freeze || collection_->scene)) &&
+                    !(waiting_ && waiting_->begins_scene);
   background().look_ahead(
       {SnapshotRange(frames().window()).newest(count), count - 1, taken() - 1, time_of(next)},
       used);
@@ -102,6 +123,7 @@ void BatchSchedule::end_window(bool at_once) {
   const Collection window = *std::exchange(collection_, std::nullopt);
   waiting_ =
       Stretch{window.begin, taken(), window.begin, window.scene ? State::learnt : window.state};
+  waiting_->begins_scene = window.scene.has_value();
   if (window.scene) begin_scene(window);
   if (waiting_->state != State::learnt) return;
   wait();
@@ -133,7 +155,7 @@ void BatchSchedule::solve_at_once() {
 // Frames before it leave with the background before; what comes after knows nothing of them.
 void BatchSchedule::begin_scene(const Collection& window) {
   wait();
-  background().begin_scene();
+  background().begin_scene(window.scene_returns);
   history_from_ = *window.scene;
   if (shown_.end != window.begin) return;
   shown_.hold_from = window.begin;

@@ -40,6 +40,7 @@ class BatchSchedule : public Schedule {
     int64_t time_zero = 0;  // the first snapshot of its model
     Background::State state = Background::State::learnt;
     int64_t hold_from = INT64_MAX;  // frames that its window does not have
+    bool begins_scene = false;      // it is another scene than what was shown before
   };
   // The one that is collected.
   struct Collection {
@@ -49,6 +50,7 @@ class BatchSchedule : public Schedule {
     Background::State state = Background::State::learnt;
     int not_added = 0;                  // newest frames whose inner products are not computed yet
     std::optional<int64_t> scene = {};  // the first frame of another scene
+    bool scene_returns = false;         // which was left before
   };
   // Shown by the first window from frame `from` on, if that one is held.
   struct Loaded {
@@ -73,6 +75,7 @@ class BatchSchedule : public Schedule {
   double time_of(int64_t frame) const { return static_cast<double>(frame - shown_.time_zero); }
 
   void look_ahead();
+  void follow_scene();
   void begin_stream();
   void decide();
   void add_group();

@@ -63,6 +63,10 @@ void Engine::flush() {
   if (leaving_) leaving_->flush();
 }
 
+void Engine::go_on() {
+  if (configured() && schedule_->queue().pending == 0) schedule_->go_on();
+}
+
 void Engine::begin_anew() {
   if (!configured() || schedule_->queue().pending > 0) return;
   background_->forget();

@@ -75,8 +75,10 @@ class Engine {
   Status drain();
   // Drops all frames and forgets the window and the model.
   void flush();
-  // No frame waits: windows to come know nothing of those before, but if one of them ends early, it
-  // has their frames. Batch only.
+  // No frame waits after drain(): the next frame comes after the one before it, after all. A window
+  // that ends early has the frames before it. Batch only.
+  void go_on();
+  // As go_on(), but windows to come know nothing of those before.
   void begin_anew();
 
   // Writes the newest background. Batch: the background of the last frame of the newest solved

@@ -37,7 +37,7 @@ bool LiveSchedule::take_in(const ImageView& frame) {
   if (!frozen) begin_work();
   if (background().state() != State::held)
     background().follow_light(frames().window().newest_slot());
-  if (background().state() == State::learnt && background().known()) mend();
+  if (background().known()) see();
   if (background().solves() > solves) published_ = {time(), background().model().light(time())};
   pace().count_frame();
   queue_ = {1, 1};
@@ -51,6 +51,8 @@ void LiveSchedule::follow_scene() {
   stop();
   const bool returns = seen == SceneSeen::the_one_before && left_.has_value();
   Learnt before;
+  // In its own light: that of the newest frames is another scene's.
+  show_newest();
   background().remember(&before);
   if (returns)
     background().return_to(*left_);
@@ -60,10 +62,16 @@ void LiveSchedule::follow_scene() {
   begin_window(returns);
 }
 
-void LiveSchedule::mend() {
+// With the newest frame: what it shows is known, and the background is mended, but for one that was
+// loaded.
+void LiveSchedule::see() {
   const int count = std::min(frames().size(), Learner::kMendingFrames);
-  background().mend({SnapshotRange(frames().window()).newest(count), count - 1,
-                     static_cast<int64_t>(frames().frames_taken()) - 1, time(), true});
+  const Learner::Compared frame = {SnapshotRange(frames().window()).newest(count), count - 1,
+                                   static_cast<int64_t>(frames().frames_taken()) - 1, time(), true};
+  if (background().state() == State::learnt)
+    background().mend(frame);
+  else if (background().state() == State::held_in_light)
+    background().look_ahead(frame, false);
 }
 
 // Publishes what is due.

@@ -57,7 +57,7 @@ class LiveSchedule : public Schedule {
 
   bool holds_frames() const override { return false; }
   void follow_scene();
-  void mend();
+  void see();
   void settle();
   void wait_for_share();
   void begin_work();

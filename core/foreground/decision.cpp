@@ -179,6 +179,18 @@ void Decision::forget() {
   frames_ = 0;
 }
 
+void Decision::change_scene(bool returns) {
+  if (!left_) {
+    left_ = Statistics{texture_, noise_, frames_};
+    returns = false;
+  } else {
+    std::swap(left_->texture, texture_);
+    std::swap(left_->noise, noise_);
+    std::swap(left_->frames, frames_);
+  }
+  if (!returns) forget();
+}
+
 void Decision::level(int y, const uint8_t* out[3]) const {
   for (size_t c = 0; c < kChannels; ++c) out[c] = of_.level[c].data() + shape_.offset(y);
 }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/base/colours.h"
@@ -70,6 +71,10 @@ class Decision {
 
   // The next frame is of another stream.
   void forget();
+  // The next frame is of another scene: what was learnt of this one is kept, in place of what was
+  // kept before. returns: of the scene that was left last, whose statistics are in use again. Takes
+  // memory; where it throws, nothing has changed.
+  void change_scene(bool returns);
   // True where no frame was decided since forget().
   bool new_born() const { return frames_ == 0; }
 
@@ -160,6 +165,12 @@ class Decision {
   bool knows_light_;
   MovingTexture texture_;
   PixelNoise noise_;
+  struct Statistics {
+    MovingTexture texture;
+    PixelNoise noise;
+    int64_t frames;
+  };
+  std::optional<Statistics> left_;  // of the scene before
   Specks specks_;
   // By strip: itself and those beside it are counted, while a frame's are not compared yet.
   std::vector<std::atomic<int>> unknown_;

@@ -6,6 +6,7 @@
 namespace qdmd {
 
 std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, const Band& band) {
+  check_steps();
   if (options.method == Method::robust)
     return std::make_unique<RobustLearner>(options, width, band);
   return std::make_unique<GramLearner>(options, width, band);

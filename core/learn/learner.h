@@ -10,6 +10,7 @@
 #include "core/dmd/options.h"
 #include "core/frames/frame_store.h"
 #include "core/learn/method.h"
+#include "core/learn/robust/learning_steps.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
 #include "core/parallel/band.h"
@@ -118,19 +119,20 @@ class Learner {
   // Once for each frame, before it is compared with the background in use, `model`. Where frames
   // show that something has left that the model took for background (live), or that something which
   // came stood still for the time to absorb, the model has what they show from now on.
-  static constexpr int kMendingFrames = 9;
+  static constexpr int kMendingFrames = steps::mending::kFrames;
   struct Compared {
     SnapshotRange around;  // the frame, and others that come next to it, kMendingFrames at most
     int at = 0;            // which of them it is
     int64_t number = 0;    // of that frame, counted like FrameStore::frames_taken()
     double t = 0;          // the frame's time in the model
     bool live = false;
+    bool mends = true;  // look_ahead(): the model is in use, and may be mended
   };
   virtual void mend(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
   // With each frame that comes, in order, where frames wait to be compared (batch). Where it and
-  // those before it show what is behind the background in use, `model` (null: there is none that
-  // they may mend), frames that are compared from now on find that. t: of the one that is compared
-  // next.
+  // those before it show what is behind the background in use, `model` (null: there is none),
+  // frames that are compared from now on find that, if it may be mended. t: the time of the one
+  // that is compared next.
   virtual void look_ahead(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
   // Takes effect with the next frame. 0: never.
   virtual void set_absorb_frames(int64_t) {}
@@ -141,10 +143,11 @@ class Learner {
   // of the background in use, or another one. What is not the same is said once, until there is a
   // background of that scene.
   virtual SceneSeen scene_of(int /*slot*/) { return SceneSeen::same; }
-  static constexpr int kSceneFrames = 8;
+  static constexpr int kSceneFrames = steps::scene::kFrames, kReturnFrames = 2;
   // Solves to come know nothing of what was before; the background in use stays. Not while one
   // runs.
-  virtual void begin_scene() {}
+  // returns: it is the scene that was left last, and what was known of it is known again.
+  virtual void begin_scene(bool /*returns*/) {}
 
   // ---- Light ----
 

@@ -14,7 +14,9 @@ namespace {
 // Something that changes line ends, or takes the eighth bit, shows.
 constexpr std::array<uint8_t, 8> kMagic = {0x89, 'Q', 'D', 'M', 'D', '\r', '\n', 0x1a};
 constexpr size_t kChecksumBytes = 8;
-constexpr uint32_t kHasLimits = 1, kHasEarlier = 2, kAllSections = kHasLimits | kHasEarlier;
+constexpr uint32_t kHasLimits = 1, kHasEarlier = 2, kHasPlaces = 4;
+constexpr size_t kPlaceBytes =
+    2 * kChannels * sizeof(float) + 6 * sizeof(uint32_t) + 2 * sizeof(uint64_t) + 2;
 // More than an engine takes.
 constexpr uint64_t kMostPixels = uint64_t{1} << 36;
 
@@ -32,7 +34,13 @@ struct Header {
     if (sections & kHasLimits) planes += 1;
     if (sections & kHasEarlier) planes += kChannels + 1;
     if (bits_below > 0) planes += kChannels;
-    return kLearntHeaderBytes + planes * pixels() + 2 * sizeof(float) * cells() + kChecksumBytes;
+    const uint64_t of_cell =
+        (has_looked() ? 3 : 2) * sizeof(float) + (sections & kHasPlaces ? kPlaceBytes : 0);
+    return kLearntHeaderBytes + planes * pixels() + of_cell * cells() + kChecksumBytes;
+  }
+  bool has_looked() const { return version > 2; }
+  uint32_t all_sections() const {
+    return kHasLimits | kHasEarlier | (version > 2 && sections & kHasEarlier ? kHasPlaces : 0);
   }
 };
 
@@ -48,7 +56,7 @@ class Writer {
   void put_plane(std::span<const uint8_t> plane) {
     bytes_.insert(bytes_.end(), plane.begin(), plane.end());
   }
-  void put_numbers(const std::vector<float>& numbers) {
+  void put_numbers(std::span<const float> numbers) {
     for (float number : numbers) put(std::bit_cast<uint32_t>(number));
   }
   const std::vector<uint8_t>& bytes() const { return bytes_; }
@@ -77,9 +85,12 @@ class Reader {
     bytes_ = bytes_.subspan(pixels);
     return plane;
   }
+  void read_numbers(std::span<float> all) {
+    for (float& one : all) one = std::bit_cast<float>(number<uint32_t>());
+  }
   std::vector<float> numbers(size_t count) {
     std::vector<float> all(count);
-    for (float& one : all) one = std::bit_cast<float>(number<uint32_t>());
+    read_numbers(all);
     return all;
   }
 
@@ -116,7 +127,8 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   if (h.version < 1 || h.version > kLearntVersion)
     return bad("it has version " + std::to_string(h.version) +
                " of the format, and this qdmdbackground reads versions 1 to " +
-               std::to_string(kLearntVersion) + ": save it again with this one.");
+               std::to_string(kLearntVersion) +
+               ": save it again with this one, or load it with the one that saved it.");
   constexpr uint32_t kMost = std::numeric_limits<int32_t>::max();
   const uint32_t most_below = h.version == 1 ? 0 : 8;
   // Cells are no smaller than pixels.
@@ -126,7 +138,7 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   const bool sane = h.width > 0 && h.height > 0 && h.width <= kMost && h.height <= kMost &&
                     h.pixels() <= kMostPixels &&
                     h.colours <= static_cast<uint32_t>(Colours::grey) &&
-                    (h.sections & ~kAllSections) == 0 && grid && h.bits_below <= most_below &&
+                    (h.sections & ~h.all_sections()) == 0 && grid && h.bits_below <= most_below &&
                     std::isfinite(h.noise) && h.noise >= 0;
   if (!sane || h.bytes != h.bytes_of_all()) return damaged("its first bytes make no sense");
   if (h.bytes != all)
@@ -136,15 +148,61 @@ Status read_header(std::span<const uint8_t> bytes, uint64_t all, Header* header)
   return {};
 }
 
-bool are_weights(const std::vector<float>& numbers) {
+bool are_weights(std::span<const float> numbers) {
   return std::all_of(numbers.begin(), numbers.end(),
                      [](float number) { return std::isfinite(number) && number >= 0; });
+}
+
+void put_place(const LearntPlace& place, Writer* writer) {
+  writer->put_numbers(place.look);
+  writer->put_numbers(place.before);
+  for (uint32_t time : {place.since, place.before_since, place.before_until, place.judged_since,
+                        place.left, place.absorbed_since})
+    writer->put(time);
+  for (uint64_t passed : place.passed) writer->put(passed);
+  for (uint8_t number : {place.judgement, place.is_absorbed_news}) writer->put(number);
+}
+
+// False where it makes no sense.
+bool read_place(Reader* reader, LearntPlace* place) {
+  reader->read_numbers(place->look);
+  reader->read_numbers(place->before);
+  for (uint32_t* time : {&place->since, &place->before_since, &place->before_until,
+                         &place->judged_since, &place->left, &place->absorbed_since})
+    *time = reader->number<uint32_t>();
+  for (uint64_t& passed : place->passed) passed = reader->number<uint64_t>();
+  for (uint8_t* number : {&place->judgement, &place->is_absorbed_news})
+    *number = reader->number<uint8_t>();
+  return are_weights(place->look) && are_weights(place->before) &&
+         place->judgement <= LearntPlace::kLeft && place->is_absorbed_news <= 1;
+}
+
+Status read_earlier(const Header& header, Reader* reader, LearntEarlier* earlier) {
+  const auto pixels = static_cast<size_t>(header.pixels());
+  const auto cells = static_cast<size_t>(header.cells());
+  for (auto& level : earlier->level) level = reader->plane(pixels);
+  earlier->spread = reader->plane(pixels);
+  earlier->rows = static_cast<int>(header.rows);
+  earlier->cols = static_cast<int>(header.cols);
+  earlier->weight = reader->numbers(cells);
+  earlier->limit = reader->numbers(cells);
+  if (header.has_looked())
+    earlier->looked = reader->numbers(cells);
+  else
+    earlier->looked.assign(cells,
+                           *std::max_element(earlier->weight.begin(), earlier->weight.end()));
+  bool sane =
+      are_weights(earlier->weight) && are_weights(earlier->limit) && are_weights(earlier->looked);
+  earlier->places.resize(header.sections & kHasPlaces ? cells : 0);
+  for (LearntPlace& place : earlier->places) sane = read_place(reader, &place) && sane;
+  return sane ? Status() : damaged("it has numbers that are none");
 }
 
 }  // namespace
 
 std::vector<uint8_t> pack(const Learnt& learnt) {
   Header header;
+  header.version = kLearntVersion;
   header.width = static_cast<uint32_t>(learnt.width);
   header.height = static_cast<uint32_t>(learnt.height);
   header.bits_below = static_cast<uint32_t>(bits_below(learnt.picture.depth));
@@ -153,12 +211,13 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
     header.sections |= kHasEarlier;
     header.rows = static_cast<uint32_t>(learnt.earlier->rows);
     header.cols = static_cast<uint32_t>(learnt.earlier->cols);
+    if (!learnt.earlier->places.empty()) header.sections |= kHasPlaces;
   }
   const uint64_t bytes = header.bytes_of_all();
   Writer writer(bytes);
   writer.put_plane(kMagic);
   for (uint32_t number :
-       {kLearntVersion, header.width, header.height, static_cast<uint32_t>(learnt.colours),
+       {header.version, header.width, header.height, static_cast<uint32_t>(learnt.colours),
         header.sections, header.rows, header.cols, header.bits_below})
     writer.put(number);
   writer.put(std::bit_cast<uint64_t>(learnt.noise));
@@ -170,6 +229,8 @@ std::vector<uint8_t> pack(const Learnt& learnt) {
     writer.put_plane(learnt.earlier->spread);
     writer.put_numbers(learnt.earlier->weight);
     writer.put_numbers(learnt.earlier->limit);
+    writer.put_numbers(learnt.earlier->looked);
+    for (const LearntPlace& place : learnt.earlier->places) put_place(place, &writer);
   }
   for (const auto& below : learnt.picture.below) writer.put_plane(below);
   writer.put(checksum(writer.bytes()));
@@ -189,7 +250,6 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
     return damaged("its checksum is wrong");
   Reader reader(checked.subspan(kLearntHeaderBytes));
   const auto pixels = static_cast<size_t>(header.pixels());
-  const auto cells = static_cast<size_t>(header.cells());
   Learnt read;
   read.width = static_cast<int>(header.width);
   read.height = static_cast<int>(header.height);
@@ -197,17 +257,9 @@ Status unpack(std::span<const uint8_t> bytes, Learnt* learnt) {
   read.noise = header.noise;
   for (auto& level : read.picture.level) level = reader.plane(pixels);
   if (header.sections & kHasLimits) read.limits = reader.plane(pixels);
-  if (header.sections & kHasEarlier) {
-    Learnt::EarlierWindow& earlier = read.earlier.emplace();
-    for (auto& level : earlier.level) level = reader.plane(pixels);
-    earlier.spread = reader.plane(pixels);
-    earlier.rows = static_cast<int>(header.rows);
-    earlier.cols = static_cast<int>(header.cols);
-    earlier.weight = reader.numbers(cells);
-    earlier.limit = reader.numbers(cells);
-    if (!are_weights(earlier.weight) || !are_weights(earlier.limit))
-      return damaged("it has numbers that are none");
-  }
+  if (header.sections & kHasEarlier)
+    if (Status status = read_earlier(header, &reader, &read.earlier.emplace()); !status.ok())
+      return status;
   read.picture.depth = 8 + static_cast<int>(header.bits_below);
   for (auto& below : read.picture.below) {
     below = reader.plane(header.bits_below > 0 ? pixels : 0);

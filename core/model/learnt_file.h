@@ -15,12 +15,18 @@ namespace qdmd {
 //   magic, 8 bytes; u32 version; u32 width, height; u32 colours; u32 sections, a bit for each of
 //   those that may be missing; u32 rows, columns of the grid, or 0; u32 bits of samples below the
 //   highest eight, 0 to 8; f64 noise; u64 bytes of the file
-//   the picture's three planes; [limits]; [earlier: three planes, spread; f32 weights, limits];
+//   the picture's three planes; [limits];
+//   [earlier: three planes, spread; f32 weights, limits, frames that could have shown it]
+//   [places, where there is `earlier`, for each cell: f32 look, look before, of each channel; u32
+//   since, before_since, before_until, judged_since, left, absorbed_since; two u64 of who passed;
+//   u8 judgement, is_absorbed_news: see LearntPlace]
 //   [the bits below the picture's, if there are any: three planes]
 //   u64 FNV-1a of all bytes before it
-// Version 1 has none of these bits and is read, too; a file of another version is refused. If you
-// change what a file holds, or the grid, count this up.
-constexpr uint32_t kLearntVersion = 2;
+// Version 2 has no places, and does not say how many frames could have shown the background (as
+// many as showed it where most did); version 1 has no bits below the picture's either. Both are
+// read; a file of another version is refused. If you change what a file holds, or the grid, count
+// this up.
+constexpr uint32_t kLearntVersion = 3;
 constexpr size_t kLearntHeaderBytes = 56;
 
 // `learnt` is whole: as Engine::learnt() made it, or unpack().
@@ -31,8 +37,8 @@ std::vector<uint8_t> pack(const Learnt& learnt);
 // say what is wrong with it and what to do.
 Status check_header(std::span<const uint8_t> header, uint64_t bytes);
 
-// Reads a whole file. If it is not ok, `learnt` is unchanged. May throw std::bad_alloc; asks for no
-// more memory than `bytes` have.
+// Reads a whole file. If it is not ok, `learnt` is unchanged. May throw std::bad_alloc; asks for
+// hardly more memory than `bytes` have.
 Status unpack(std::span<const uint8_t> bytes, Learnt* learnt);
 
 }  // namespace qdmd

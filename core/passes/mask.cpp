@@ -327,11 +327,9 @@ GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, cons
 }
 
 bool refine_gain(const GainSums& sums, Gain* gain) {
-  // Where less fits, the gain would be of what moves.
-  constexpr double kLeastShare = 0.1;
   const auto fit = static_cast<double>(sums[2 * kChannels]),
              seen = static_cast<double>(sums[2 * kChannels + 1]);
-  if (fit < kLeastShare * seen) return false;
+  if (fit < kLeastFits * seen) return false;
   for (size_t c = 0; c < kChannels; ++c)
     if (sums[c] > 0)
       (*gain)[c] = static_cast<float>(static_cast<double>(sums[c]) /

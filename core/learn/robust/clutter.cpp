@@ -4,17 +4,13 @@
 #include <cmath>
 
 #include "core/learn/robust/contour.h"
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/patch_density.h"
 
 namespace qdmd {
 namespace {
 
-// Clutter hides more than this share of the background, as far as that is known.
-constexpr double kClutter = 0.3;
-// What so large a share of the frames shows rests.
-constexpr double kShared = 0.1;
-// No colour says more than this, as a logarithm: those that are seldom seen would.
-constexpr double kMostSaid = 3;
+using namespace steps::clutter;
 
 // Sums over the cells within kPatchRadius, along a line of `count` that are `step` apart.
 void add_along(const float* from, size_t step, int count, float* out) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/learn/robust/learning_steps.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
@@ -33,7 +34,7 @@ class ClutterColours {
   std::span<const float> weigh(std::span<const float> density);
 
  private:
-  static constexpr int kSteps = 8, kColours = kSteps * kSteps * kSteps;
+  static constexpr int kSteps = steps::clutter::kSteps, kColours = kSteps * kSteps * kSteps;
   static int colour_of(const float* const look[3], size_t cell);
   // Finds a look's logarithms, by cells, in two rooms of as many numbers.
   void find_logarithms(int look, float* room, float* out) const;

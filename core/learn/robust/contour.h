@@ -6,16 +6,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/grid.h"
-#include "core/passes/patch_density.h"
 
 namespace qdmd {
 
-// Regions of fewer cells say nothing.
-constexpr size_t kLeastRegion = 6;
+using steps::contours::kLeastRegion, steps::contours::kLooksDiffer;
 
-// Two looks of a cell differ by more than so many levels, mean of the channels.
-constexpr float kLooksDiffer = 10;
+// Two looks of a cell differ.
 inline bool differs_at(const float* const a[3], const float* const b[3], size_t cell) {
   float sum = 0;
   for (int c = 0; c < kChannels; ++c) sum += std::abs(a[c][cell] - b[c][cell]);
@@ -79,8 +77,7 @@ class Contour {
   // True where it is so much weaker in a picture's planes `a` than in `b` that what `b` shows
   // stands before what `a` shows.
   bool is_weaker(const float* const a[3], const float* const b[3]) const {
-    constexpr size_t kLeastPairs = 8;
-    constexpr float kMargin = 1.2f, kMoreLevels = 1;
+    using namespace steps::contours;
     return pairs_.size() >= kLeastPairs && strength(b) > kMargin * strength(a) + kMoreLevels;
   }
 
@@ -90,7 +87,7 @@ class Contour {
     for (const auto& [a, b] : pairs_) {
       float d = 0;
       for (int c = 0; c < kChannels; ++c) d += std::abs(planes[c][a] - planes[c][b]);
-      sum += std::min(d / 3, kMostDistance);
+      sum += std::min(d / 3, steps::contours::kMostEdge);
     }
     return static_cast<float>(sum / static_cast<double>(pairs_.size()));
   }

@@ -2,36 +2,38 @@
 
 #include <algorithm>
 
+#include "core/learn/robust/places.h"
+
 namespace qdmd {
-namespace {
-
-// The part, of `theirs` of a length, in which the middle of part k of `ours` lies.
-int middle_in(int k, int ours, int theirs) {
-  return static_cast<int>((2 * int64_t{k} + 1) * theirs / (2 * int64_t{ours}));
-}
-
-}  // namespace
 
 LitPicture EarlierWindow::picture(const Gain& gain) const {
   return {{level_[0].data(), level_[1].data(), level_[2].data()}, gain};
 }
 
 Recollection EarlierWindow::recollection(float most) const {
-  Recollection result = {weight_, limit_};
+  Recollection result = {weight_, limit_, weight_};
+  for (size_t cell = 0; cell < weight_.size(); ++cell)
+    result.share[cell] = looked_[cell] > 0 ? weight_[cell] / looked_[cell] : 0;
   for (float& weight : result.weight) weight = std::min(weight, most);
   return result;
 }
 
 void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
                          const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
-                         const StableFrames& stable, int count, float fresh) {
+                         const StableFrames& stable, int count, float fresh,
+                         const std::vector<uint8_t>& held) {
   known_ = false;
   weight_.resize(grid.cells());
+  looked_.resize(grid.cells());
   for (size_t cell = 0; cell < grid.cells(); ++cell) {
     const std::span<const uint16_t> frames = stable.of_cell[cell];
     const bool confirmed = !frames.empty() && frames.back() == count;
     const auto shown = static_cast<float>(frames.size() - (confirmed ? 1 : 0));
     weight_[cell] = (confirmed ? weight_[cell] : 0) + fresh * shown;
+    // What hides it for a while says nothing of how often it is seen.
+    const bool hidden = !held.empty() && held[cell];
+    looked_[cell] =
+        (confirmed ? looked_[cell] : 0) + fresh * (hidden ? shown : static_cast<float>(count));
   }
   limit_ = stable.limit;
   spread_ = spread;
@@ -50,6 +52,7 @@ void EarlierWindow::write(const Grid& grid, Learnt::EarlierWindow* out) const {
   out->cols = grid.cols;
   out->weight = weight_;
   out->limit = limit_;
+  out->looked = looked_;
 }
 
 void EarlierWindow::read(const Grid& grid, const Learnt::EarlierWindow& from) {
@@ -58,6 +61,7 @@ void EarlierWindow::read(const Grid& grid, const Learnt::EarlierWindow& from) {
   spread_.reserve(from.spread.size());
   weight_.reserve(grid.cells());
   limit_.reserve(grid.cells());
+  looked_.reserve(grid.cells());
   for (size_t c = 0; c < kChannels; ++c) {
     level_[c] = from.level[c];
     cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
@@ -65,14 +69,12 @@ void EarlierWindow::read(const Grid& grid, const Learnt::EarlierWindow& from) {
   spread_ = from.spread;
   weight_.resize(grid.cells());
   limit_.resize(grid.cells());
-  for (int row = 0; row < grid.rows; ++row)
-    for (int col = 0; col < grid.cols; ++col) {
-      const auto cell = static_cast<size_t>(row * grid.cols + col);
-      const auto its = static_cast<size_t>(middle_in(row, grid.rows, from.rows) * from.cols +
-                                           middle_in(col, grid.cols, from.cols));
-      weight_[cell] = from.weight[its];
-      limit_[cell] = from.limit[its];
-    }
+  looked_.resize(grid.cells());
+  each_with_its(grid, from.rows, from.cols, [&](size_t cell, size_t its) {
+    weight_[cell] = from.weight[its];
+    limit_[cell] = from.limit[its];
+    looked_[cell] = from.looked[its];
+  });
   known_ = true;
 }
 

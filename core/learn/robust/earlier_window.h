@@ -33,7 +33,7 @@ class EarlierWindow {
   // cells: the background's are picture `at` of them.
   void take(const Grid& grid, const ReferencePicture& background,
             const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
-            const StableFrames& stable, int count, float fresh);
+            const StableFrames& stable, int count, float fresh, const std::vector<uint8_t>& held);
 
   // What is known, for a file and back; its grid may be another, and each cell then knows what the
   // one at its middle did. Where read() throws, all is as it was.
@@ -44,7 +44,8 @@ class EarlierWindow {
   bool known_ = false;  // set last: what follows is whole
   GridFrames cells_;
   std::vector<uint8_t> level_[kChannels], spread_;
-  std::vector<float> weight_, limit_;  // by cells
+  // By cells; looked_: how many frames could have shown it.
+  std::vector<float> weight_, limit_, looked_;
 };
 
 }  // namespace qdmd

@@ -5,24 +5,13 @@
 #include <numeric>
 #include <utility>
 
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/median_rows.h"
 
 namespace qdmd {
 namespace {
 
-// Levels: cells that differ by less agree.
-constexpr float kAgree = 4;
-// Cells too dark or too bright have no ratio.
-constexpr float kDark = 8, kBright = 250;
-// A gain must make this many times as many cells agree, and this share of all cells besides.
-constexpr float kGrowth = 1.3f, kShare = 0.1f;
-// Frames are divided by gains.
-constexpr float kLeastGain = 0.01f;
-// Relative change of light that needs no following: less is a part of the noise.
-constexpr float kStill = 0.03f;
-// Light that is followed from frame to frame must make so many of the cells agree, and so many
-// more.
-constexpr float kLeastFollowed = 0.25f, kFollowed = 0.05f, kAllAgree = 0.9f;
+using namespace steps::light;
 
 float median(std::vector<float>* values) {
   const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
@@ -51,7 +40,7 @@ float agreement(const float* const frame[3], const float* const reference[3], si
 Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells,
                  LightScratch* scratch) {
   constexpr int kBins = 300;
-  constexpr float kBin = 0.02f, kLowest = -3, kNear = 0.05f;
+  constexpr float kLowest = -3;
   std::array<int, kBins + 4> histogram{};
   auto& ratios = scratch->ratios;
   ratios.clear();
@@ -63,7 +52,7 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
     const int bin = static_cast<int>((ratio - kLowest) / kBin);
     if (bin >= 0 && bin < kBins) ++histogram[static_cast<size_t>(bin) + 2];
   }
-  if (ratios.size() < 16) return kSameLight;
+  if (ratios.size() < kLeastRatios) return kSameLight;
   int best = 0, most = -1;
   for (int bin = 0; bin < kBins; ++bin) {
     const int* at = histogram.data() + bin + 2;

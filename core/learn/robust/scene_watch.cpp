@@ -3,19 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/learn/robust/learning_steps.h"
+
 namespace qdmd {
 namespace {
 
-// A tile is strange where its edges correlate less with the background's than this, or where only
-// one of both has any. A frame is strange where so many of the tiles with edges are, if the
-// background has edges in half of them, or one of both in nearly all. Any two of eight recorded
-// clips have 0.81 at least; of one scene, frames that look alike have 0.56 at most for kFrames
-// frames, behind leaves over most of the picture (docs/robust.md).
-constexpr double kStrangeTile = 0.25, kStrangeShare = 0.75;
-// Frames that correlate more than this look alike.
-constexpr double kAlike = 0.6;
-// Edges of fewer levels, root of the mean square, are none: noise of blocks is far below.
-constexpr double kFlat = 2;
+using namespace steps::scene;
 
 // What two lists of edges have in common.
 struct Products {
@@ -126,6 +119,14 @@ void SceneWatch::leave() {
   left_ = background_;
   left_known_ = true;
   strange_ = returned_ = 0;
+}
+
+bool SceneWatch::is_back(const float* const frame[3]) {
+  std::vector<float>& newest = frames_[next_];
+  next_ = (next_ + 1) % kFrames;
+  find_edges(frame, &newest);
+  returned_ = look_of(newest, left_) == Look::same ? returned_ + 1 : 0;
+  return returned_ >= 2;
 }
 
 SceneSeen SceneWatch::follow(const float* const frame[3], const float* const background[3]) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/learn/learner.h"
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
@@ -26,13 +27,15 @@ class SceneWatch {
   void forget() { strange_ = returned_ = 0, left_known_ = false; }
   // The frames to come are compared with another background, of another scene.
   void leave();
+  // True with the second frame in a row that shows the scene that was left.
+  bool is_back(const float* const frame[3]);
   // The next frame. Another scene: it is at least the kFrames-th in a row that does not look like
   // the background, and they look alike. The one before: it is the second in a row that looks like
   // the scene that was left last, and not like the background.
   SceneSeen follow(const float* const frame[3], const float* const background[3]);
 
  private:
-  static constexpr size_t kTilesAlong = 4;
+  static constexpr size_t kTilesAlong = steps::scene::kTilesAlong;
 
   void find_edges(const float* const planes[3], std::vector<float>* edges);
   // What a frame is to a background. Doubtful: strange where there is something to compare, but

@@ -6,29 +6,22 @@
 
 #include "core/learn/robust/clutter.h"
 #include "core/learn/robust/contour.h"
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/patch_density.h"
 
 namespace qdmd {
 namespace {
 
-// Looks that fewer than this share of the frames show (in units of alike frames, at least two) do
-// not count.
-constexpr float kLeastSupport = 0.04f;
-// The share of cells that must show what an earlier window did: people seldom hide more.
-constexpr float kLeastSeen = 0.15f;
-// Frames that propose regions.
-constexpr int kProposals = 64;
-
-// A frame shows the background where its patch is as near to the background's as kNear times the
-// nearest twentieth, or as half the distance at which patches are alike.
-constexpr float kNear = 3.5f;
-constexpr double kNearest = 0.05;
+using namespace steps::start;
 
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
-// a contour that the true background does not have.
+// a contour that the true background does not have. known: cells whose earlier background stays,
+// once they have it. counts(cell, look): false where a look says nothing.
+template <typename Counts>
 void compare_contours(const Grid& grid, const GridPictures& frames, int count,
-                      std::span<const float> density, std::vector<int>* from) {
+                      std::span<const float> density, std::span<const uint8_t> known,
+                      const Counts& counts, std::vector<int>* from) {
   if (std::min(grid.rows, grid.cols) < 4 || count < 3) return;
   const size_t cells = grid.cells();
   GridPicture background(frames, *from);
@@ -37,6 +30,13 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
   std::vector<uint8_t> differs(cells);
   const int proposals = std::min(count, kProposals);
   const int looks = static_cast<int>(density.size() / cells);
+  // The last look is the earlier background, if any cell is known.
+  const auto keeps = [&](size_t cell) {
+    if (!known[cell]) return false;
+    const float* const e[3] = {frames.plane(count, 0), frames.plane(count, 1),
+                               frames.plane(count, 2)};
+    return !differs_at(b, e, cell);
+  };
   for (int sweep = 0; sweep < 2; ++sweep) {
     bool changed = false;
     for (int i = 0; i < proposals + looks - count; ++i) {
@@ -44,7 +44,7 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
           i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
       const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
       for (size_t cell = 0; cell < cells; ++cell) {
-        differs[cell] = differs_at(f, b, cell);
+        differs[cell] = differs_at(f, b, cell) && !keeps(cell);
       }
       const auto& found = regions.find(differs);
       for (size_t region = 0; region < found.size(); ++region) {
@@ -54,9 +54,10 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
         for (int cell : inside)
           support += density[static_cast<size_t>(t) * cells + static_cast<size_t>(cell)];
         support /= static_cast<double>(inside.size());
-        if (support < std::max(2.0, kLeastSupport * static_cast<double>(count))) continue;
+        if (support < std::max(kLeastAlike, kLeastSupport * static_cast<double>(count))) continue;
         if (!Contour(grid, regions, static_cast<int>(region), inside).is_weaker(f, b)) continue;
         for (int cell : inside) {
+          if (!counts(static_cast<size_t>(cell), t)) continue;
           (*from)[static_cast<size_t>(cell)] = t;
           background.take(frames, t, static_cast<size_t>(cell));
         }
@@ -129,12 +130,11 @@ std::vector<int> densest(std::span<const float> density, size_t cells, Pool* poo
 void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
                        std::span<const float> density, std::vector<int>* from, Pool* pool,
                        StableFramesRoom* room) {
-  constexpr int kRounds = 3;
   ClutterColours colours(grid, frames, count, pool);
   if (!colours.hides_much(density, *from)) return;
   // Steps are not needed meanwhile, and this takes less.
   LargeVector<uint16_t>().swap(room->steps);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < steps::clutter::kRounds; ++round) {
     colours.learn(*from);
     *from = densest(colours.weigh(density), grid.cells(), pool);
   }
@@ -151,7 +151,7 @@ uint64_t steps_bytes(const Grid& grid, uint64_t looks) {
 float limit_of(std::span<const float> distance, size_t left_out, std::span<float> scratch) {
   const size_t others = distance.size() - (left_out < distance.size() ? 1 : 0);
   const auto nearest = static_cast<size_t>(kNearest * static_cast<double>(others - 1));
-  constexpr float kLeast = kSimilar / 2;
+  const float kLeast = kSimilar * kAlways;
   // Where enough frames are near, it is no matter how near.
   size_t near = 0;
   for (float d : distance) near += kNear * d <= kLeast ? 1 : 0;
@@ -168,7 +168,8 @@ float limit_of(std::span<const float> distance, size_t left_out, std::span<float
 
 StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
-                                const FirstLooks& first_looks, StableFramesRoom* room) {
+                                const FirstLooks& first_looks, StableFramesRoom* room,
+                                std::span<const uint8_t> held) {
   StableFramesRoom own_room;
   if (!room) room = &own_room;
   const size_t cells = grid.cells();
@@ -197,8 +198,14 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
   std::vector<int> from = densest(density, cells, pool);
   // What was absorbed is the background of a part of the frames only.
-  if (first_looks.from.empty()) leave_clutter_out(grid, frames, count, density, &from, pool, room);
-  compare_contours(grid, frames, count, density, &from);
+  if (!first_looks.absorbed) leave_clutter_out(grid, frames, count, density, &from, pool, room);
+  std::vector<uint8_t> known(cells);
+  for (size_t cell = 0; earlier && cell < earlier->share.size(); ++cell) {
+    const bool keeps = !held.empty() && held[cell] && earlier->share[cell] >= kHeld;
+    if (keeps) from[cell] = count;
+    known[cell] = keeps || earlier->share[cell] >= kKnown;
+  }
+  compare_contours(grid, frames, count, density, known, counts, &from);
 
   make_room(&room->distance, cells * static_cast<size_t>(looks));
   const uint16_t* const distance = room->distance.data();

@@ -65,14 +65,19 @@ struct StableFrames {
 // patches are alike up to `limit`.
 struct Recollection {
   std::vector<float> weight, limit;
-  int older_frames = 0;  // of those that are compared with it, the first so many are no news
+  std::vector<float> share;  // of the frames that could have shown it; empty: unknown
+  int older_frames = 0;      // of those that are compared with it, the first so many are no news
 };
 
 // The looks of a cell that count: those from `from` on, and the earlier windows' unless
 // `earlier_counts` is 0. Empty: all do.
 struct FirstLooks {
+  FirstLooks() = default;
+  explicit FirstLooks(size_t cells) : from(cells), earlier_counts(cells, 1) {}
+
   std::vector<uint16_t> from;
   std::vector<uint8_t> earlier_counts;
+  bool absorbed = false;  // some looks are background only because they stood for so long
 };
 
 // Memory that solves use again: taken anew, each of its pages would cost a visit to the kernel.
@@ -90,12 +95,14 @@ struct StableFramesRoom {
 // where `earlier` is given; it is frame `count` then. A cell's background is the look of the patch
 // around it that most frames share (the mode of the patches' density), corrected where another
 // frame's region fits its surroundings better: what stands still for long shows by its contour. If
-// something hides most of the picture, looks that have its colours count less. room: null: memory
+// something hides most of the picture, looks that have its colours count less. held: cells that
+// keep the earlier background, if enough frames have shown it; or none. room: null: memory
 // is taken anew.
 StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, int count,
                                 const Recollection* earlier, Pool* pool,
                                 const FirstLooks& first_looks = {},
-                                StableFramesRoom* room = nullptr);
+                                StableFramesRoom* room = nullptr,
+                                std::span<const uint8_t> held = {});
 // The memory that it takes beside the room while it looks for them.
 uint64_t stable_frames_bytes(const Grid& grid, uint64_t looks, int threads);
 

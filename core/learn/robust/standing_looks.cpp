@@ -4,15 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/places.h"
+
 namespace qdmd {
 namespace {
 
-constexpr float kSame = StandingLooks::kSame;
-// What a frame counts in a look, at least.
-constexpr float kShare = 0.1f;
-// Frames that hide a cell: one of several may be the noise of cells of few pixels.
-constexpr std::ptrdiff_t kHiding = 2;
+using namespace steps::looks;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
+constexpr int kPassedInFiles = 128;  // frames
 // Cells that are followed together: plain loops, which the compiler makes vectors of.
 constexpr size_t kTogether = 64;
 
@@ -23,13 +23,15 @@ struct Planes {
       : red(of[0] + first), green(of[1] + first), blue(of[2] + first) {}
 };
 
-// How far cells of two pictures are apart, sum of the channels; returns how many are not the same.
-inline int compare(const Planes& a, const Planes& b, size_t count, float* __restrict apart) {
+// How far cells of two pictures are apart, sum of the channels; returns how many are not nearer
+// than `same`.
+inline int compare(const Planes& a, const Planes& b, size_t count, float* __restrict apart,
+                   float same = kSame) {
   for (size_t i = 0; i < count; ++i)
     apart[i] = std::abs(a.red[i] - b.red[i]) + std::abs(a.green[i] - b.green[i]) +
                std::abs(a.blue[i] - b.blue[i]);
   int others = 0;
-  for (size_t i = 0; i < count; ++i) others += apart[i] < kSame ? 0 : 1;
+  for (size_t i = 0; i < count; ++i) others += apart[i] < same ? 0 : 1;
   return others;
 }
 
@@ -51,22 +53,66 @@ StandingLooks::StandingLooks(const Grid& grid)
       frames_(grid.cells()),
       next_frames_(grid.cells()),
       differs_(grid.cells()) {
+  passed_.resize(kHistory * words());
   found_.reserve(grid.cells());
 }
 
 uint64_t StandingLooks::bytes(const Grid& grid) {
   return GridFrames::bytes(grid, 3) +
-         grid.cells() * (sizeof(Cell) + sizeof(uint8_t) + 3 * sizeof(int));
+         grid.cells() * (sizeof(Cell) + sizeof(uint8_t) + 3 * sizeof(int)) +
+         kHistory * ((grid.cells() + 63) / 64) * sizeof(uint64_t);
 }
 
 void StandingLooks::forget() {
   std::fill(cells_.begin(), cells_.end(), Cell());
   std::fill(frames_.begin(), frames_.end(), 0);
   std::fill(next_frames_.begin(), next_frames_.end(), 0);
+  std::fill(passed_.begin(), passed_.end(), uint64_t{0});
+}
+
+void StandingLooks::write(size_t at, int64_t now, LearntPlace* out) const {
+  if (frames_[at] == 0) return;
+  const Cell& cell = cells_[at];
+  out->since = frames_ago(cell.look.since, now);
+  for (int c = 0; c < kChannels; ++c) out->look[c] = looks_.plane(kLook, c)[at];
+  for (int ago = 0; ago < kPassedInFiles; ++ago)
+    if (passed(static_cast<int>(at), now - ago)) out->passed[ago / 64] |= uint64_t{1} << (ago % 64);
+  if (!cell.had_before) return;
+  out->before_since = frames_ago(cell.before.since, now);
+  out->before_until = frames_ago(cell.before.last, now);
+  for (int c = 0; c < kChannels; ++c) out->before[c] = looks_.plane(kBefore, c)[at];
+}
+
+bool StandingLooks::read(size_t at, int64_t now, const LearntPlace& from) {
+  if (frames_[at] > 0) {
+    float apart = 0;
+    for (int c = 0; c < kChannels; ++c)
+      apart += std::abs(looks_.plane(kLook, c)[at] - from.look[c]);
+    if (from.since == LearntPlace::kNever || apart >= kSame) return false;
+  }
+  // A look that frames have shown has who passed.
+  for (int ago = 0; ago < kPassedInFiles && frames_[at] == 0; ++ago)
+    passed_[row_of(now - ago) + at / 64] |= (from.passed[ago / 64] >> (ago % 64) & 1) << (at % 64);
+  number_ = now;
+  Cell& cell = cells_[at];
+  cell = Cell();
+  // More frames count no more.
+  frames_[at] = from.since == LearntPlace::kNever ? 0 : kSteady;
+  next_frames_[at] = 0;
+  if (frames_[at] == 0) return true;
+  cell.look = {now - from.since, now};
+  cell.had_before = from.before_until != LearntPlace::kNever;
+  if (cell.had_before) cell.before = {now - from.before_since, now - from.before_until};
+  for (int c = 0; c < kChannels; ++c) {
+    looks_.plane(kLook, c)[at] = from.look[c];
+    looks_.plane(kBefore, c)[at] = from.before[c];
+  }
+  return true;
 }
 
 void StandingLooks::follow(const float* const frame[3], const Gain& gain, int64_t number) {
   previous_ = std::exchange(number_, number);
+  std::fill_n(passed_.begin() + static_cast<ptrdiff_t>(row_of(number)), words(), uint64_t{0});
   const Gain inverse = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
   const float* const looks[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                  looks_.plane(kLook, 2)};
@@ -108,6 +154,7 @@ void StandingLooks::see_other(size_t at, const std::array<float, kChannels>& lev
   Cell& cell = cells_[at];
   int& frames = next_frames_[at];
   if (frames_[at] > 0 && frames == 0) cell.look.last = previous_;
+  if (frames_[at] >= kSteady) passed_[row_of(number_) + at / 64] |= uint64_t{1} << (at % 64);
   float* const next[3] = {looks_.plane(kNext, 0) + at, looks_.plane(kNext, 1) + at,
                           looks_.plane(kNext, 2) + at};
   float away = 0;
@@ -130,6 +177,7 @@ void StandingLooks::take_next(size_t at) {
   for (int c = 0; c < kChannels; ++c)
     from_before += std::abs(looks_.plane(kNext, c)[at] - looks_.plane(kBefore, c)[at]);
   const Look before = std::exchange(cell.before, cell.look);
+  cell.had_before = frames_[at] > 0;
   cell.look = {cell.next_since, number_};
   frames_[at] = std::exchange(next_frames_[at], 0);
   if (from_before < kSame && cell.look.since - before.last <= before.last - before.since)
@@ -176,6 +224,25 @@ void StandingLooks::leave_out_hidden(const GridFrames& frames, std::span<const L
     const auto count = std::count_if(slots.begin(), slots.end(), hides);
     return count >= kHiding || 2 * count >= std::ssize(slots);
   });
+}
+
+size_t StandingLooks::find_differing(const float* const background[3],
+                                     std::vector<uint8_t>* differs) const {
+  const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
+                                looks_.plane(kLook, 2)};
+  const float kDiffer = kChannels * kLooksDiffer;
+  size_t found = 0;
+  in_blocks(grid_.cells(), [&](size_t first, size_t count) {
+    float apart[kTogether];
+    uint8_t* const out = differs->data() + first;
+    std::fill_n(out, count, uint8_t{0});
+    if (compare({look, first}, {background, first}, count, apart, kDiffer) == 0) return;
+    for (size_t i = 0; i < count; ++i) {
+      out[i] = apart[i] > kDiffer && shows(first + i);
+      found += out[i];
+    }
+  });
+  return found;
 }
 
 const std::vector<int>& StandingLooks::stood(const float* const background[3], int64_t frames) {

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/learn/robust/contour.h"
+#include "core/learn/robust/learning_steps.h"
+#include "core/model/learnt.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
@@ -21,10 +23,10 @@ struct LitSlot {
 // A cell's look is what it showed last for kSteady frames in a row.
 class StandingLooks {
  public:
-  static constexpr int kSteady = 10;
+  static QDMD_STEP int kSteady = steps::looks::kSteady;
   // A cell shows the same as long as it is within so many levels, sum of the channels: noise of
   // cells' means is far below.
-  static constexpr float kSame = 12;
+  static QDMD_STEP float kSame = steps::looks::kSame;
 
   StandingLooks() = default;
   // Takes all memory.
@@ -35,11 +37,40 @@ class StandingLooks {
   void forget();
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number);
+  // What a cell shows and showed, for a file and back, as it was with frame `now`. read() is false,
+  // and changes nothing, where frames have shown another look since.
+  void write(size_t cell, int64_t now, LearntPlace* out) const;
+  bool read(size_t cell, int64_t now, const LearntPlace& from);
   // The look of a cell, where it is known.
   float level(int cell, int channel) const { return looks_.plane(0, channel)[cell]; }
   // The frame with which its look came. What was hidden for no longer than it had been there goes
   // on to be what it was.
   int64_t since(int cell) const { return cells_[static_cast<size_t>(cell)].look.since; }
+  // The newest frame that showed the look before; kNever: there was none.
+  static constexpr int64_t kNever = INT64_MIN;
+  int64_t before_until(int cell) const {
+    const Cell& of = cells_[static_cast<size_t>(cell)];
+    return of.had_before ? of.before.last : kNever;
+  }
+  // For how many frames that look had been there.
+  int64_t before_stood(int cell) const {
+    const Cell& of = cells_[static_cast<size_t>(cell)];
+    return of.had_before ? of.before.last - of.before.since : 0;
+  }
+  // True where the cell shows its look now.
+  bool shows_look(int cell) const { return shows(static_cast<size_t>(cell)); }
+  const GridFrames& levels() const { return looks_; }
+  // Marks the cells that show their look now, where it is another than the background's. Returns
+  // how many they are.
+  size_t find_differing(const float* const background[3], std::vector<uint8_t>* differs) const;
+  int64_t newest() const { return number_; }
+  // True where something passed before the cell's look in that frame, one of the last kHistory.
+  static constexpr int kHistory = 256;
+  bool passed(int cell, int64_t number) const {
+    if (number > number_ || number <= number_ - kHistory) return false;
+    const auto at = static_cast<size_t>(cell);
+    return passed_[row_of(number) + at / 64] >> (at % 64) & 1;
+  }
 
   // Good until the next call of either:
   // What was uncovered: cells whose look has lasted for kSteady frames and is not the background's,
@@ -58,8 +89,8 @@ class StandingLooks {
   // True where uncovered() saw enough cells whose look is not the background's and has come within
   // the last kNewsFrames frames, be it uncovered or something that stops.
   bool any_news() const { return news_ >= kLeastNews; }
-  static constexpr int kNewsFrames = 25;
-  static constexpr size_t kLeastNews = 3 * kLeastRegion;
+  static QDMD_STEP int kNewsFrames = steps::looks::kNewsFrames;
+  static QDMD_STEP size_t kLeastNews = steps::looks::kLeastNews;
   // What has stood for `frames` frames: regions of cells whose look is not the background's, half
   // of which came so long ago, with the cells next to them.
   const std::vector<int>& stood(const float* const background[3], int64_t frames);
@@ -74,7 +105,13 @@ class StandingLooks {
   struct Cell {
     Look look, before;
     int64_t next_since = 0;
+    bool had_before = false;
   };
+  size_t words() const { return (frames_.size() + 63) / 64; }
+  // Numbers before those of the stream are negative.
+  size_t row_of(int64_t number) const {
+    return static_cast<size_t>(number & (kHistory - 1)) * words();
+  }
   bool shows(size_t cell) const { return frames_[cell] >= kSteady && next_frames_[cell] == 0; }
   void see_other(size_t cell, const std::array<float, kChannels>& level);
   void take_next(size_t cell);
@@ -86,6 +123,7 @@ class StandingLooks {
   // none.
   std::vector<int> frames_, next_frames_;
   int64_t number_ = 0, previous_ = 0;  // of the newest frame, and of the one before
+  std::vector<uint64_t> passed_;       // a bit a cell, kHistory frames
   std::vector<uint8_t> differs_;
   std::vector<int> found_;
   size_t news_ = 0, differing_ = 0;

@@ -4,19 +4,18 @@
 #include <algorithm>
 
 #include "core/learn/learner.h"
+#include "core/learn/robust/learning_steps.h"
 
 namespace qdmd {
 
 // Every second frame of a window like the default's tells nearly as much of its background as all
 // do, in half of the time. Fewer than `least` snapshots tell less. Windows that overlap see most
-// frames again: every third one is enough there. A window of kLongWindow frames and more is for the
-// best background that there is.
-constexpr int kLongWindow = 120;
+// frames again: every third one is enough there.
 struct Thinning {
   int least, most_stride;
 
   int stride_of(int frames) const {
-    return frames < kLongWindow ? std::clamp(frames / least, 1, most_stride) : 1;
+    return frames < steps::pace::kLongWindow ? std::clamp(frames / least, 1, most_stride) : 1;
   }
   int snapshots_of(int frames) const {
     const int stride = stride_of(frames);
@@ -30,8 +29,16 @@ struct Thinning {
     return most;
   }
 };
-constexpr Thinning thinning_of(Models models) {
-  return models == Models::two_of_live ? Thinning{33, 3} : Thinning{50, 2};
+inline Thinning thinning_of(Models models) {
+  using namespace steps::pace;
+  return models == Models::two_of_live ? Thinning{kLeastOfLive, kMostStrideOfLive}
+                                       : Thinning{kLeast, kMostStride};
+}
+
+// Frames between those that a solve looks at are not remembered. Windows that overlap still have a
+// part of what is remembered, and need more of it: there all frames count.
+inline int remembered_stride(Models models, int window_size) {
+  return models == Models::two_of_live ? 1 : thinning_of(models).stride_of(window_size);
 }
 
 }  // namespace qdmd

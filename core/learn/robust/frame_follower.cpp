@@ -1,0 +1,122 @@
+#include "core/learn/robust/frame_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/places.h"
+
+namespace qdmd {
+namespace {
+
+using namespace steps::pace;
+
+}  // namespace
+
+void FrameFollower::begin() {
+  const Grid& grid = context_.grid;
+  const Models models = context_.room.models;
+  background_cells_ = GridFrames(grid, 2);
+  light_scratch_ = LightScratch(grid.cells());
+  // Frames that wait can wait for a proof.
+  if (context_.follows(models))
+    memory_ = SceneMemory(grid, models == Models::two_of_live ? steps::proofs::kYoungFrames : 0);
+  if (models != Models::two_of_live) looks_ = StandingLooks(grid);
+  absorbed_ = HistoryStarts(grid.cells());
+  scene_ = SceneWatch(grid);
+}
+
+uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
+  const Grid& grid = context.grid;
+  return GridFrames::bytes(grid, 2) + LightScratch::bytes(grid.cells()) +
+         (context.follows(models) ? SceneMemory::bytes(grid) : 0) +
+         (models == Models::two_of_live ? 0 : StandingLooks::bytes(grid)) +
+         HistoryStarts::bytes(grid.cells()) + SceneWatch::bytes(grid);
+}
+
+void FrameFollower::forget() {
+  looks_.forget();
+  memory_.forget();
+  absorbed_.forget();
+  scene_.forget();
+  other_scene_ = scene_begins_ = false;
+  calm_ = 0;
+}
+
+void FrameFollower::publish(bool whole) {
+  // Not while the solve runs: frames that come beside it mend what it would be compared with.
+  calm_ = whole && is_calm() ? calm_ + 1 : 0;
+  published_ = 1 - published_;
+  if (!std::exchange(scene_begins_, false)) return;
+  looks_.forget();
+  if (context_.room.models != Models::two_of_live) memory_.forget();
+  other_scene_ = false;
+}
+
+// What the newest solve found is what the one in use has.
+bool FrameFollower::is_calm() const {
+  double sum = 0;
+  size_t moved = 0;
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
+    float distance = 0;
+    for (int c = 0; c < kChannels; ++c)
+      distance +=
+          std::abs(background_cells_.plane(0, c)[cell] - background_cells_.plane(1, c)[cell]);
+    sum += static_cast<double>(distance);
+    moved += distance > kCalmCell;
+  }
+  const auto cells = static_cast<double>(context_.grid.cells());
+  return sum < kCalmMean * cells && static_cast<double>(moved) < kMostMoved * cells;
+}
+
+SceneSeen FrameFollower::scene_of(int slot) {
+  if (other_scene_ && scene_begins_) return SceneSeen::same;
+  const GridFrames& cells = context_.room.frames->cells();
+  const Cells frame(cells, slot);
+  const Cells background = this->background();
+  if (other_scene_) {
+    // It is no scene of its own yet.
+    if (!scene_.is_back(frame)) return SceneSeen::same;
+    other_scene_ = false;
+    return SceneSeen::the_one_before;
+  }
+  const SceneSeen seen = scene_.follow(frame, background);
+  other_scene_ = seen != SceneSeen::same;
+  if (other_scene_) scene_.leave();
+  return seen;
+}
+
+void FrameFollower::begin_scene() {
+  absorbed_.forget();
+  calm_ = 0;
+  scene_begins_ = true;
+  // Where frames wait, they show the scene before until publish().
+  if (context_.room.models == Models::two_of_live) memory_.forget();
+}
+
+void FrameFollower::write(std::vector<LearntPlace>* places) const {
+  places->resize(context_.grid.cells());
+  for (size_t cell = 0; cell < places->size(); ++cell) {
+    memory_.write(cell, newest_number(), &(*places)[cell]);
+    absorbed_.write(cell, newest_number(), &(*places)[cell]);
+  }
+}
+
+void FrameFollower::read(const LearntEarlier& from) {
+  memory_.grow_up();
+  if (from.places.empty()) return;
+  const int64_t now = newest_number();
+  each_with_its(context_.grid, from.rows, from.cols, [&](size_t cell, size_t its) {
+    const LearntPlace& place = from.places[its];
+    if (context_.room.models != Models::two_of_live) looks_.read(cell, now, place);
+    if (memory_.read(cell, now, place)) absorbed_.read(cell, now, place);
+  });
+}
+
+void FrameFollower::follow(const std::vector<uint8_t> level[kChannels]) {
+  for (int c = 0; c < kChannels; ++c)
+    cell_means(context_.grid, level[c].data(), background_cells_.plane(published_, c));
+}
+
+}  // namespace qdmd

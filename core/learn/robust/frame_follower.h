@@ -1,0 +1,103 @@
+// Follows the frames of a stream between its solves, with the background in use.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "core/learn/robust/history_starts.h"
+#include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/light.h"
+#include "core/learn/robust/scene_memory.h"
+#include "core/learn/robust/scene_watch.h"
+#include "core/learn/robust/solve_history.h"
+#include "core/learn/robust/standing_looks.h"
+
+namespace qdmd {
+
+// Mends the background where frames show that something has left or was absorbed, notices other
+// scenes, and knows the light of frames. Solves run beside it: what they are told is a copy.
+class FrameFollower {
+ public:
+  explicit FrameFollower(const RobustContext& context) : context_(context) {}
+  // Takes all memory.
+  void begin();
+  static uint64_t bytes(const RobustContext& context, Models models);
+  void forget();
+
+  // The cells of two backgrounds, in unit light: picture used() is of the one in use; a solve
+  // writes the other one, and publish() puts it in use. whole: it is of a whole window.
+  GridFrames* cells() { return &background_cells_; }
+  int used() const { return published_; }
+  void publish(bool whole);
+  // What is known of cells, for a file and back. Where read() throws, all is as it was.
+  void write(std::vector<LearntPlace>* places) const;
+  void read(const LearntEarlier& from);
+  // The background in use is this picture now.
+  void follow(const std::vector<uint8_t> level[kChannels]);
+  // Solves are told what is known.
+  void tell(SolveHistory* history) { history->take(&absorbed_, &memory_); }
+  // Learner::enough().
+  int enough() const { return 1 + std::min(calm_, steps::pace::kMostCalm); }
+
+  // As those of a Learner.
+  void mend(const Learner::Compared& frame, BackgroundModel* model);
+  void look_ahead(const Learner::Compared& frame, BackgroundModel* model);
+  void set_absorb_frames(int64_t frames) { absorb_frames_ = frames; }
+  SceneSeen scene_of(int slot);
+  void begin_scene();
+  Gain light(int slot) {
+    return light_over(context_.room.frames->cells(), slot, background_cells_, published_,
+                      &light_scratch_);
+  }
+
+ private:
+  // Of the newest frame, or -1.
+  int64_t newest_number() const {
+    return static_cast<int64_t>(context_.room.frames->frames_taken()) - 1;
+  }
+  // Frames that cells of a background are taken from, each in its own light.
+  struct LitFrames {
+    SnapshotRange frames;
+    std::array<LitSlot, Learner::kMendingFrames> at;
+    std::span<const LitSlot> slots() const {
+      return {at.data(), static_cast<size_t>(frames.size())};
+    }
+  };
+  // The three channels of a picture of cells.
+  struct Cells {
+    const float* of[kChannels];
+    Cells(const GridFrames& cells, int at)
+        : of{cells.plane(at, 0), cells.plane(at, 1), cells.plane(at, 2)} {}
+    operator const float* const*() const { return of; }
+  };
+  Cells background() const { return {background_cells_, published_}; }
+  bool is_calm() const;
+  LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
+                       const BackgroundModel* of_window);
+  void mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
+                      const Learner::Compared& frame, const Gain& light,
+                      const BackgroundModel* of_window, BackgroundModel* model);
+  void mend(const std::vector<int>& cells, const StandingLooks& looks,
+            const Learner::Compared& frame, const LitFrames& lit, BackgroundModel* model);
+  void replace(const std::vector<int>& cells, const StandingLooks& looks, const LitFrames& lit,
+               BackgroundModel* model);
+  void replace_deep(const std::vector<int>& cells, const LitFrames& lit,
+                    BackgroundModel* model) const;
+
+  const RobustContext& context_;
+  GridFrames background_cells_;
+  int published_ = 0;
+  LightScratch light_scratch_;
+  SceneMemory memory_;   // what frames that came showed
+  StandingLooks looks_;  // what frames showed when they were compared, in batch
+  HistoryStarts absorbed_;
+  int64_t absorb_frames_ = 0;
+  SceneWatch scene_;
+  // Solves in a row that changed little, since a cell was mended.
+  int calm_ = 0;
+  // Another scene was seen; and solves know of it, but no background yet.
+  bool other_scene_ = false, scene_begins_ = false;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,348 @@
+#include "core/learn/robust/scene_memory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/places.h"
+
+namespace qdmd {
+namespace {
+
+using namespace steps::proofs;
+
+double balance(double a, double b, double least) { return (a - b) / (a + b + least); }
+
+// The element that so large a share of the others is below.
+int64_t at_share(std::vector<int64_t>* of, double share) {
+  const auto at = of->begin() + static_cast<ptrdiff_t>(share * static_cast<double>(of->size() - 1));
+  std::nth_element(of->begin(), at, of->end());
+  return *at;
+}
+
+}  // namespace
+
+SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
+    : grid_(grid),
+      looks_(grid),
+      uncovered_(grid.cells()),
+      of_(grid.cells()),
+      since_(grid.cells()),
+      left_(grid.cells(), StandingLooks::kNever),
+      differs_(grid.cells()),
+      unjudged_(grid.cells()),
+      marks_(grid.cells()),
+      young_frames_(young_frames) {
+  found_.reserve(grid.cells());
+  around_.reserve(grid.cells());
+}
+
+uint64_t SceneMemory::bytes(const Grid& grid) {
+  return StandingLooks::bytes(grid) + HistoryStarts::bytes(grid.cells()) +
+         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 2 * sizeof(int));
+}
+
+void SceneMemory::forget() {
+  followed_ = 0;
+  looks_.forget();
+  uncovered_.forget();
+  std::fill(of_.begin(), of_.end(), Of::none);
+  std::fill(differs_.begin(), differs_.end(), uint8_t{0});
+  std::fill(left_.begin(), left_.end(), StandingLooks::kNever);
+  newest_left_ = StandingLooks::kNever;
+  news_ = false;
+}
+
+void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
+  const int at = static_cast<int>(cell);
+  looks_.write(cell, now, out);
+  // What solves know of what left is in the earlier window.
+  const bool is_known = of_[cell] == Of::came || (of_[cell] == Of::left && uncovered_.is_news(at));
+  if (out->since != LearntPlace::kNever && is_known && since_[cell] >= looks_.since(at)) {
+    out->judgement = of_[cell] == Of::came ? LearntPlace::kCame : LearntPlace::kLeft;
+    out->judged_since = frames_ago(since_[cell], now);
+  }
+  if (left_[cell] != StandingLooks::kNever) out->left = frames_ago(left_[cell], now);
+}
+
+bool SceneMemory::read(size_t cell, int64_t now, const LearntPlace& from) {
+  constexpr Of kJudgements[] = {Of::none, Of::came, Of::left};
+  static_assert(LearntPlace::kCame == 1 && LearntPlace::kLeft == 2);
+  if (!looks_.read(cell, now, from)) return false;
+  of_[cell] = kJudgements[from.judgement];
+  since_[cell] = now - from.judged_since;
+  left_[cell] = from.left == LearntPlace::kNever ? StandingLooks::kNever : now - int64_t{from.left};
+  newest_left_ = std::max(newest_left_, left_[cell]);
+  if (of_[cell] == Of::left) uncovered_.add(static_cast<int>(cell), since_[cell]);
+  return true;
+}
+
+template <typename What>
+void SceneMemory::each_near(int cell, int reach, const What& what) const {
+  const int y = cell / grid_.cols, x = cell % grid_.cols;
+  for (int yy = std::max(0, y - reach); yy <= std::min(grid_.rows - 1, y + reach); ++yy)
+    for (int xx = std::max(0, x - reach); xx <= std::min(grid_.cols - 1, x + reach); ++xx)
+      what(yy * grid_.cols + xx);
+}
+
+// Quarters of the cells may be earlier and later: they had something else before them.
+SceneMemory::Change SceneMemory::change_of(const std::vector<int>& region) const {
+  std::vector<int64_t> last, since;
+  for (int cell : region) {
+    since.push_back(looks_.since(cell));
+    if (looks_.before_until(cell) != StandingLooks::kNever)
+      last.push_back(std::min(looks_.before_until(cell), looks_.since(cell)));
+  }
+  Change change;
+  change.known = 2 * last.size() >= region.size();
+  change.until = at_share(&since, 0.75);
+  change.from = change.known ? std::min(change.until, at_share(&last, 0.25)) : change.until;
+  return change;
+}
+
+SceneMemory::Motion SceneMemory::motion_around(const std::vector<int>& region,
+                                               const Change& change) {
+  enum Mark : uint8_t { far, around, beside, near, inside };
+  std::fill(marks_.begin(), marks_.end(), uint8_t{far});
+  around_.clear();
+  for (int cell : region)
+    each_near(cell, 1, [&](int at) { marks_[static_cast<size_t>(at)] = beside; });
+  for (int cell : region)
+    each_near(cell, kAround, [&](int at) {
+      uint8_t& mark = marks_[static_cast<size_t>(at)];
+      if (mark != far) return;
+      // Not what changed with it.
+      if (std::abs(looks_.since(at) - change.until) <= kAtOnce) return;
+      mark = around;
+      around_.push_back(at);
+    });
+  // Something large counts no more than something of the region's size, or than all that is around.
+  const auto most =
+      static_cast<double>(std::max<size_t>(1, std::min(region.size(), around_.size())));
+  const auto mean = [&](int64_t first, int64_t last) {
+    double sum = 0;
+    for (int64_t t = first; t <= last; ++t) {
+      const auto passed = std::count_if(around_.begin(), around_.end(),
+                                        [&](int cell) { return looks_.passed(cell, t); });
+      sum += std::min(1.0, static_cast<double>(passed) / most);
+    }
+    return last < first ? 0 : sum / static_cast<double>(last - first + 1);
+  };
+  for (int cell : region) marks_[static_cast<size_t>(cell)] = inside;
+  size_t cells = 0, unsettled = 0;
+  for (int cell : region)
+    each_near(cell, kNear, [&](int at) {
+      uint8_t& mark = marks_[static_cast<size_t>(at)];
+      if (mark == near || mark == inside) return;
+      mark = near;
+      ++cells;
+      unsettled += looks_.passed(at, looks_.newest());
+    });
+  return {mean(change.from - kMoves + 1, change.from),
+          mean(change.until, std::min(looks_.newest(), change.until + kMoves - 1)),
+          cells == 0 ? 0 : static_cast<double>(unsettled) / static_cast<double>(cells)};
+}
+
+void SceneMemory::decide(const std::vector<int>& region, Of of) {
+  for (int cell : region) {
+    const auto at = static_cast<size_t>(cell);
+    of_[at] = of;
+    since_[at] = looks_.since(cell);
+    if (of != Of::left) continue;
+    newest_left_ = left_[at] = looks_.newest();
+    uncovered_.add(cell, since_[at]);
+  }
+}
+
+bool SceneMemory::left_beside(const std::vector<int>& region) const {
+  bool found = false;
+  for (int cell : region)
+    each_near(cell, 1, [&](int near) {
+      const auto at = static_cast<size_t>(near);
+      if (left_[at] == StandingLooks::kNever || looks_.newest() - left_[at] > kPieces) return;
+      found |= looks_.newest() - left_[at] <= kMoves ||
+               (looks_.before_until(cell) != StandingLooks::kNever &&
+                std::abs(looks_.before_until(cell) - since_[at]) <= kMoves);
+    });
+  return found;
+}
+
+bool SceneMemory::came_beside(const std::vector<int>& region) const {
+  size_t beside = 0;
+  for (int cell : region) {
+    bool found = false;
+    each_near(cell, 1, [&](int near) {
+      const auto at = static_cast<size_t>(near);
+      found |= of_[at] == Of::came && since_[at] >= looks_.since(near);
+    });
+    beside += found;
+  }
+  return beside > 0;
+}
+
+// True where looks came with that frame, or one next to it, in many places of the picture.
+bool SceneMemory::is_all_over(int64_t since) const {
+  std::array<bool, kTilesAlong* kTilesAlong> tiles = {};
+  for (int row = 0; row < grid_.rows; ++row)
+    for (int col = 0; col < grid_.cols; ++col) {
+      const int cell = row * grid_.cols + col;
+      if (!differs_[static_cast<size_t>(cell)]) continue;
+      if (std::abs(looks_.since(cell) - since) > kAtOnce) continue;
+      tiles[static_cast<size_t>(row * kTilesAlong / grid_.rows * kTilesAlong +
+                                col * kTilesAlong / grid_.cols)] = true;
+    }
+  return 2 * std::count(tiles.begin(), tiles.end(), true) >= std::ssize(tiles);
+}
+
+void SceneMemory::judge(const std::vector<int>& region, const Contours& contours) {
+  if (region.size() < kLeastRegion) {
+    if (left_beside(region) && !came_beside(region)) decide(region, Of::left);
+    return;
+  }
+  const Change change = change_of(region);
+  const Motion motion = motion_around(region, change);
+  const RegionContours contour = contours(region);
+  const bool says = contour.pairs >= kLeastPairs && contour.open <= contour.pairs &&
+                    contour.background >= kLeastContour;
+  const double stronger =
+      says ? balance(static_cast<double>(contour.background), static_cast<double>(contour.look), 1)
+           : 0;
+  const double went_on = change.known ? balance(motion.after, motion.before, 0.1) : 0;
+  const int64_t stood = looks_.newest() - change.until;
+  const bool settled = motion.near < kSettled;
+  // What comes beside what stands there is mostly a part of it.
+  const double least = came_beside(region) ? kMuchStronger : kStronger;
+  const bool is_clear = region.size() >= kClearRegion && stronger > kClear &&
+                        stronger + kOfMotion * went_on > kClearBoth;
+  const bool left = settled ? stronger > kStronger && stronger + kOfMotion * went_on > least
+                            : stronger > kMuchStronger &&
+                                  stronger + kOfMotion * went_on > kMuchStronger &&
+                                  (stood >= 2 * kMoves || is_clear);
+  // A picture that is out of focus has weak contours all over, and nothing went there.
+  const bool disturbed = motion.after < kWentOn && stood < kLasts && is_all_over(change.until);
+  if (left && !disturbed) return decide(region, Of::left);
+  if (stood >= 3 * kMoves && !left) decide(region, Of::came);
+}
+
+const std::vector<int>& SceneMemory::judge(const float* const background[3],
+                                           const Contours& contours) {
+  found_.clear();
+  news_ = false;
+  if (std::min(grid_.rows, grid_.cols) < 4) return found_;
+  if (young()) {
+    const std::vector<int>& left = looks_.uncovered(background);
+    news_ = looks_.any_news();
+    return left;
+  }
+  const size_t differing = looks_.find_differing(background, &differs_);
+  const bool any_left =
+      newest_left_ != StandingLooks::kNever && looks_.newest() - newest_left_ <= kPieces;
+  if (differing < kLeastRegion && (differing == 0 || !any_left)) return found_;
+  size_t news = 0;
+  for (size_t cell = 0; cell < grid_.cells(); ++cell)
+    news += differs_[cell] &&
+            looks_.newest() - looks_.since(static_cast<int>(cell)) < StandingLooks::kNewsFrames;
+  news_ = news >= StandingLooks::kLeastNews;
+  if (judge_as_one(differing)) return found_;
+  // What was judged stays so as long as it is there.
+  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
+    unjudged_[cell] = 0;
+    if (!differs_[cell]) continue;
+    const int at = static_cast<int>(cell);
+    if (since_[cell] < looks_.since(at)) of_[cell] = Of::none;
+    unjudged_[cell] = of_[cell] == Of::none;
+  }
+  CellRegions regions(grid_);
+  for (const std::vector<int>& region : regions.find(unjudged_)) {
+    judge(region, contours);
+    if (of_[static_cast<size_t>(region[0])] == Of::left)
+      found_.insert(found_.end(), region.begin(), region.end());
+  }
+  if (!found_.empty()) widen(background);
+  // What passes before a cell may have hidden what is behind.
+  for (size_t cell = 0; cell < grid_.cells(); ++cell)
+    if (differs_[cell] && !unjudged_[cell] && of_[cell] == Of::left)
+      found_.push_back(static_cast<int>(cell));
+  return found_;
+}
+
+// No object changes so much of the picture: the camera was moved, or something disturbs it. What
+// lasts is background.
+bool SceneMemory::judge_as_one(size_t differing) {
+  if (kMostOfPicture * static_cast<double>(grid_.cells()) > static_cast<double>(differing))
+    return false;
+  for (size_t cell = 0; cell < differs_.size(); ++cell) {
+    const int at = static_cast<int>(cell);
+    if (!differs_[cell] || looks_.newest() - looks_.since(at) < kLasts) continue;
+    if (of_[cell] != Of::left || since_[cell] < looks_.since(at)) {
+      of_[cell] = Of::left;
+      since_[cell] = looks_.since(at);
+      uncovered_.add(at, since_[cell]);
+    }
+  }
+  return true;
+}
+
+float SceneMemory::apart(int cell, const float* const background[3]) const {
+  float sum = 0;
+  for (int c = 0; c < kChannels; ++c)
+    sum += std::abs(looks_.level(cell, c) - background[c][static_cast<size_t>(cell)]);
+  return sum;
+}
+
+// What left reaches into the cells around.
+void SceneMemory::widen(const float* const background[3]) {
+  std::fill(marks_.begin(), marks_.end(), uint8_t{0});
+  for (int cell : found_) marks_[static_cast<size_t>(cell)] = 1;
+  size_t first = 0;
+  for (int step = 0; step < kRim; ++step) {
+    const size_t end = found_.size();
+    for (size_t i = first; i < end; ++i)
+      each_near(found_[i], 1, [&](int near) {
+        const auto at = static_cast<size_t>(near);
+        if (marks_[at] || !looks_.shows_look(near)) return;
+        if (of_[at] == Of::came && since_[at] >= looks_.since(near)) return;
+        const bool shows_it = apart(near, background) >= StandingLooks::kSame;
+        if (step > 0 && !shows_it) return;
+        marks_[at] = 1;
+        found_.push_back(near);
+        if (shows_it) {
+          decide({near}, Of::left);
+          return;
+        }
+        // It shows too little of it to have changed its look.
+        of_[at] = Of::left;
+        since_[at] = since_[static_cast<size_t>(found_[i])];
+        uncovered_.add(near, since_[at]);
+      });
+    first = end;
+  }
+}
+
+void SceneMemory::hand_over(Proofs* solve) {
+  solve->any = false;
+  solve->young = young();
+  std::fill(solve->came.begin(), solve->came.end(), uint8_t{0});
+  if (solve->young) return;
+  for (size_t cell = 0; cell < of_.size(); ++cell) {
+    const int at = static_cast<int>(cell);
+    const Of of = since_[cell] >= looks_.since(at) ? of_[cell] : Of::none;
+    marks_[cell] = of == Of::came || (of == Of::none && differs_[cell]);
+    if (!marks_[cell]) continue;
+    solve->any = true;
+    solve->came[cell] = 1;
+    solve->since[cell] = of == Of::came ? since_[cell] : Proofs::kUnsure;
+  }
+  // What stands there reaches into the cells around.
+  for (size_t cell = 0; cell < of_.size(); ++cell)
+    if (marks_[cell])
+      each_near(static_cast<int>(cell), kRim, [&](int near) {
+        const auto at = static_cast<size_t>(near);
+        if (solve->came[at] || (of_[at] == Of::left && since_[at] >= looks_.since(near))) return;
+        solve->came[at] = 1;
+        solve->since[at] = solve->since[cell];
+      });
+}
+
+}  // namespace qdmd

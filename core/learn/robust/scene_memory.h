@@ -1,0 +1,125 @@
+// What is known of each place of the scene, and by what proof: what stands there came, or it was
+// uncovered.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/learn/robust/history_starts.h"
+#include "core/learn/robust/region_contours.h"
+#include "core/learn/robust/standing_looks.h"
+
+namespace qdmd {
+
+// Where something stands before the background when a solve begins, also as long as nobody can say
+// whether it came: the older look stays.
+struct Proofs {
+  Proofs() = default;
+  explicit Proofs(size_t cells) : came(cells), since(cells) {}
+  static uint64_t bytes(uint64_t cells) { return cells * (sizeof(uint8_t) + sizeof(int64_t)); }
+
+  std::vector<uint8_t> came;
+  std::vector<int64_t> since;  // the frame with which it came; kUnsure: nobody has said that yet
+  static constexpr int64_t kUnsure = INT64_MAX;
+  bool any = false;    // something stands somewhere
+  bool young = false;  // SceneMemory::young()
+};
+
+// Follows the frames of a stream as they come. A region that shows something else than its
+// background, and shows it steadily, is judged by two proofs:
+//   motion    what comes arrives through the places around it and stops; what leaves goes on
+//             through them. So things pass there before the change, or after it.
+//   contours  what stands before something else ends in an edge, which what is behind does not have
+//             (contours_of: in full resolution).
+// | proof                                                             | what the region is |
+// |-------------------------------------------------------------------|--------------------|
+// | the background's contour is stronger, and motion does not say     | left               |
+// |   the contrary; all around has settled                            |                    |
+// | much stronger, and nothing settles for kMoves frames more         | left               |
+// | a few cells beside what has just left                             | left               |
+// | most of the picture differs, for kLasts frames                    | left: it is no object |
+// | anything else                                                     | came: the older look stays
+// |
+class SceneMemory {
+ public:
+  SceneMemory() = default;
+  // Takes all memory but what judge() needs for a moment. young_frames: see young().
+  SceneMemory(const Grid& grid, int64_t young_frames);
+  static uint64_t bytes(const Grid& grid);
+
+  // Nothing is known.
+  void forget();
+  // What is known of a cell, for a file and back: see StandingLooks.
+  void write(size_t cell, int64_t now, LearntPlace* out) const;
+  bool read(size_t cell, int64_t now, const LearntPlace& from);
+  // Somebody else has seen enough frames: the scene is not young.
+  void grow_up() { followed_ = std::max(followed_, young_frames_); }
+  // The next frame of the stream, its levels divided by `gain`. number: counts frames.
+  void follow(const float* const frame[3], const Gain& gain, int64_t number) {
+    looks_.follow(frame, gain, number);
+    ++followed_;
+  }
+  // What the cells show.
+  const StandingLooks& looks() const { return looks_; }
+  StandingLooks& looks() { return looks_; }
+
+  // The contours of a region in the newest frame and in the background.
+  using Contours = std::function<RegionContours(const std::vector<int>& region)>;
+  // Judges what does not show its background, after follow(). Returns the cells that show now what
+  // is behind what has left, and the cells next to them that belong to it. Good until the next
+  // call. May throw std::bad_alloc.
+  const std::vector<int>& judge(const float* const background[3], const Contours& contours);
+  // True where something new stands in enough cells that the next solve should look at it.
+  bool any_news() const { return news_; }
+  // True while so few frames were seen that nothing is known: looks are judged by contours alone,
+  // as windows judge them.
+  bool young() const { return followed_ < young_frames_; }
+  // Makes `solve` what is known, with the background of the newest judge(). Takes no memory.
+  void hand_over(Proofs* solve);
+
+  // Where something was found to have left, and since when.
+  HistoryStarts& uncovered() { return uncovered_; }
+
+ private:
+  // What is known of a cell's look: nothing yet; it came; it was behind what has left.
+  enum class Of : uint8_t { none, came, left };
+  // The share of the cells around a region before which something passes, a frame's mean, in the
+  // frames before and after it changed; and of those next to it now.
+  struct Motion {
+    double before = 0, after = 0, near = 0;
+  };
+  // The frames between which a region changed: the last that showed what was there before, and the
+  // first that shows what is there now.
+  struct Change {
+    int64_t from = 0, until = 0;
+    bool known = false;  // something was known before
+  };
+  Change change_of(const std::vector<int>& region) const;
+  Motion motion_around(const std::vector<int>& region, const Change& change);
+  void judge(const std::vector<int>& region, const Contours& contours);
+  void decide(const std::vector<int>& region, Of of);
+  bool came_beside(const std::vector<int>& region) const;
+  bool is_all_over(int64_t since) const;
+  bool left_beside(const std::vector<int>& region) const;
+  void widen(const float* const background[3]);
+  bool judge_as_one(size_t differing);
+  float apart(int cell, const float* const background[3]) const;
+  template <typename What>
+  void each_near(int cell, int reach, const What& what) const;
+
+  Grid grid_;
+  StandingLooks looks_;
+  HistoryStarts uncovered_;
+  // By cells: the newest judgement, the frame with which the look came that it is about, and the
+  // frame in which something was last found to have left.
+  std::vector<Of> of_;
+  std::vector<int64_t> since_, left_;
+  int64_t newest_left_ = StandingLooks::kNever;
+  std::vector<uint8_t> differs_, unjudged_, marks_;
+  std::vector<int> found_, around_;
+  bool news_ = false;
+  int64_t young_frames_ = 0, followed_ = 0;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,68 @@
+#include "core/learn/robust/solve_history.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace qdmd {
+
+void SolveHistory::begin() {
+  const size_t cells = context_.grid.cells();
+  absorbed_ = uncovered_ = HistoryStarts(cells);
+  proofs_ = Proofs(cells);
+  held_.reserve(cells);
+}
+
+void SolveHistory::forget() {
+  absorbed_.forget();
+  uncovered_.forget();
+  proofs_.any = false;
+}
+
+void SolveHistory::take(HistoryStarts* absorbed, SceneMemory* memory) {
+  absorbed->hand_over(&absorbed_);
+  if (!context_.follows(context_.room.models)) return;
+  memory->uncovered().hand_over(&uncovered_);
+  memory->hand_over(&proofs_);
+}
+
+FirstLooks SolveHistory::first_looks(const std::vector<int64_t>& numbers, bool earlier_known) {
+  FirstLooks looks;
+  if (absorbed_.any() || uncovered_.any()) looks = FirstLooks(context_.grid.cells());
+  looks.absorbed = absorbed_.any();
+  held_.assign(context_.grid.cells(), 0);
+  known_foreground_.clear();
+  for (const HistoryStarts* starts : {&absorbed_, &uncovered_}) {
+    if (!starts->any()) continue;
+    starts->leave_out(numbers, &looks);
+    for (int cell = 0; cell < static_cast<int>(context_.grid.cells()); ++cell)
+      if (starts->since(cell) > numbers.front())
+        known_foreground_.push_back({cell, HistoryStarts::kNever, starts->since(cell) - 1});
+  }
+  if (!proofs_.any || !earlier_known) return looks;
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
+    const int at = static_cast<int>(cell);
+    // What was absorbed is background, until it leaves.
+    held_[cell] = proofs_.came[cell] && !absorbed_.has(at);
+    if (held_[cell])
+      known_foreground_.push_back({at, proofs_.since[cell], std::numeric_limits<int64_t>::max()});
+  }
+  return looks;
+}
+
+void SolveHistory::take_out(int64_t number, uint8_t* bits) const {
+  for (const KnownForeground& known : known_foreground_) {
+    if (number < known.first || number > known.last) continue;
+    const int row = known.cell / context_.grid.cols, col = known.cell % context_.grid.cols;
+    for (int y = std::max(context_.grid.top(row) - context_.band.first(), 0);
+         y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
+         ++y) {
+      const size_t line = static_cast<size_t>(y) * static_cast<size_t>(context_.grid.width);
+      for (int x = context_.grid.left(col); x < context_.grid.left(col + 1); ++x) {
+        const size_t p = line + static_cast<size_t>(x);
+        bits[p / 8] |= static_cast<uint8_t>(1u << (p % 8));
+      }
+    }
+  }
+}
+
+}  // namespace qdmd

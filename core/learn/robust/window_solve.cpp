@@ -1,0 +1,232 @@
+#include "core/learn/robust/window_solve.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "core/dmd/qdmd.h"
+#include "core/learn/robust/thinning.h"
+
+namespace qdmd {
+namespace {
+
+// Makes a summary of frames that are `stride` apart one of frames that follow each other.
+void divide_time(int stride, DmdSummary* summary) {
+  summary->omega /= stride;
+  summary->lambda = std::polar(std::pow(std::abs(summary->lambda), 1.0 / stride),
+                               std::arg(summary->lambda) / stride);
+}
+
+}  // namespace
+
+void WindowSolve::begin() {
+  const LearnerRoom& room = context_.room;
+  const int snapshots = thinning_of(room.models).most_snapshots(room.window_size);
+  const size_t pixels = context_.pixels();
+  stable_room_ =
+      StableFramesRoom(context_.grid, most_looks(context_, room.window_size, room.models));
+  mask_ = WindowMask(snapshots, pixels);
+  samples_ = Window(snapshots, context_.samples_at(context_.finest_step));
+  gram_ = SlidingGram(snapshots, room.pool);
+  reference_.width = context_.grid.width;
+  reference_.height = context_.band.rows();
+  for (auto& level : reference_.level) level.resize(pixels);
+  reference_.threshold.resize(pixels);
+  spread_.resize(pixels);
+  // Runs read to their end.
+  reach_.resize(room.frames->window().plane_size());
+}
+
+void WindowSolve::resize_samples() { samples_.resize(context_.samples_at(context_.step)); }
+
+uint64_t WindowSolve::most_looks(const RobustContext& context, int window_size, Models models) {
+  const int snapshots = thinning_of(models).most_snapshots(window_size);
+  return static_cast<uint64_t>(std::min(snapshots, context.parameters.start_frames) +
+                               remembered_frames(context, window_size, models) + 1);
+}
+
+int WindowSolve::remembered_frames(const RobustContext& context, int window_size, Models models) {
+  const int frames = window_size / remembered_stride(models, window_size);
+  const double share = static_cast<double>(context.parameters.remembered_share) * frames;
+  return std::min(static_cast<int>(share), context.parameters.start_frames / 2);
+}
+
+uint64_t WindowSolve::bytes(const RobustContext& context, int window_size, Models models,
+                            int threads) {
+  const int snapshots = thinning_of(models).most_snapshots(window_size);
+  const uint64_t looks = most_looks(context, window_size, models), pixels = context.pixels();
+  // The reference: levels, spread, threshold, reach.
+  return pixels * (kChannels + 3) + StableFrames::bytes(context.grid, looks) +
+         StableFramesRoom::bytes(context.grid, looks) + WindowMask::bytes(snapshots, pixels) +
+         PlaneSlots::bytes(snapshots, context.samples_at(context.finest_step)) +
+         SlidingGram::bytes(snapshots, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
+}
+
+// One after another: what a start compares, with densities and then a spread; masks; the
+// decomposition; the combination.
+uint64_t WindowSolve::scratch_bytes(const RobustContext& context, int window_size, Models models,
+                                    int threads) {
+  const auto workers = static_cast<uint64_t>(threads);
+  const Grid& grid = context.grid;
+  const uint64_t looks = most_looks(context, window_size, models), pixels = context.pixels();
+  const uint64_t start =
+      GridFrames::bytes(grid, static_cast<int>(looks) + 1) +
+      std::max<uint64_t>({light_of_bytes(grid, threads), stable_frames_bytes(grid, looks, threads),
+                          pixels + blur_bytes(grid.width, threads)});
+  const uint64_t masks = workers * mask_scratch_bytes(grid.width, grid.height) +
+                         WindowMask::scratch_bytes(pixels, threads);
+  const uint64_t filling =
+      workers * (context.options.depth > 8 ? Filler<uint16_t>::bytes(window_size)
+                                           : Filler<uint8_t>::bytes(window_size));
+  const auto samples = static_cast<double>(context.samples_at(context.finest_step));
+  return std::max(
+      {start, masks, decomposition_bytes(context.options.dmd, samples, window_size), filling});
+}
+
+DmdSummary WindowSolve::solve(const SnapshotRange& window, int64_t first, const Known& known,
+                              BackgroundModel* model) {
+  const LearnOptions& options = context_.options;
+  const int stride = thinning_of(context_.room.models).stride_of(window.size());
+  window_ = {window, window.every(stride), first, stride};
+  const SnapshotRange& snapshots = window_->snapshots;
+  DmdSummary found;
+  start(known);
+  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+    refine_light();
+    find_foreground(*known.history);
+    const Decomposition decomposition = decompose_filled();
+    found = decomposition.summary;
+    divide_time(stride, &found);
+    const bool deep = options.depth > 8 && iteration + 1 == options.iterations;
+    // Where all is so dark that its highest bits are 0, they have no mode.
+    const bool dark = deep && found.background_modes == 0;
+    model->begin_from(snapshots.size(), snapshots.pixels(),
+                      dark ? mean_of_frames(snapshots.size()) : decomposition.background);
+    model->set_stride(stride);
+    model->make_steady();
+    if (deep)
+      combine<uint16_t>(model);
+    else
+      combine<uint8_t>(model);
+    take_reference(model, window.size() / 2);
+  }
+  return found;
+}
+
+void WindowSolve::find_foreground(const SolveHistory& history) {
+  const SnapshotRange& snapshots = window_->snapshots;
+  // Taken here: tasks of the pool take no memory.
+  const size_t scratch_size = mask_scratch_bytes(reference_.width, reference_.height);
+  const auto scratch =
+      std::make_unique_for_overwrite<uint8_t[]>(scratch_size * context_.room.pool->threads());
+  mask_.find_all(snapshots.size(), context_.room.pool, [&](int t, size_t worker, uint8_t* bits) {
+    find_mask(reference_, snapshots.picture(t), gains_[static_cast<size_t>(t)], bits,
+              scratch.get() + worker * scratch_size);
+    history.take_out(window_->number(t), bits);
+  });
+}
+
+Decomposition WindowSolve::decompose_filled() {
+  const SnapshotRange& snapshots = window_->snapshots;
+  {
+    const Clock::Span span(*context_.room.clock, Clock::samples);
+    samples_.clear();
+    while (samples_.size() < snapshots.size()) samples_.append();
+    const size_t size = mask_bytes(context_.pixels());
+    const auto bits =
+        std::make_unique_for_overwrite<uint8_t[]>(size * context_.room.pool->threads());
+    context_.room.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
+      const int t = static_cast<int>(part), slot = samples_.slot(t);
+      uint8_t* const own_bits = bits.get() + worker * size;
+      mask_.read(t, own_bits);
+      uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
+                               samples_.plane(slot, 2)};
+      fill_samples(reference_, own_bits, snapshots.picture(t), gains_[part], reach_.data(),
+                   context_.sampled_rows(), out);
+    });
+    gram_.add_newest(samples_, samples_.size());
+  }
+  DmdOptions options = context_.options.dmd;
+  options.omega_threshold *= window_->stride;
+  const size_t seen = sample_count(context_.grid.width, context_.grid.height, context_.step);
+  return qdmd::decompose(samples_, gram_.matrix(samples_, context_.band.team()), options,
+                         static_cast<double>(seen));
+}
+
+// The modes' pictures from filled frames, run by run.
+template <typename Sample>
+void WindowSolve::combine(BackgroundModel* model) {
+  const SnapshotRange& snapshots = window_->snapshots;
+  std::vector<Filler<Sample>> fillers;
+  for (size_t i = 0; i < context_.room.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
+  const size_t run = fillers[0].run();
+  context_.room.pool->run((context_.pixels() + run - 1) / run, [&](size_t part, size_t worker) {
+    const size_t first = part * run, count = std::min(run, context_.pixels() - first);
+    model->build_from(
+        fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
+        first, count);
+  });
+}
+
+// The next background picture: L(t) in unit light.
+void WindowSolve::take_reference(BackgroundModel* model, double t) {
+  model->set_time(t);
+  in_runs([&](size_t first, size_t count) {
+    uint8_t* const out[3] = {reference_.level[0].data() + first, reference_.level[1].data() + first,
+                             reference_.level[2].data() + first};
+    model->evaluate(first, count, out);
+  });
+}
+
+// The light of the frames by sampled pixels.
+void WindowSolve::refine_light() {
+  if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
+  const Clock::Span span(*context_.room.clock, Clock::samples);
+  std::vector<int> all(gains_.size());
+  std::iota(all.begin(), all.end(), 0);
+  refine_gains(window_->snapshots, all, &gains_);
+  settle_light(&gains_);
+}
+
+// refine_gain() of some frames, by the samples of all members.
+void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
+                               std::vector<Gain>* gains) {
+  std::vector<GainSums> sums(frames.size());
+  std::vector<uint8_t> goes_on(frames.size(), 1);
+  const auto gain_of = [&](size_t i) -> Gain& { return (*gains)[static_cast<size_t>(frames[i])]; };
+  for (int round = 0; round < kGainRounds; ++round) {
+    context_.room.pool->run(frames.size(), [&](size_t i) {
+      sums[i] = goes_on[i] ? gain_sums(reference_, snapshots.picture(frames[i]), gain_of(i),
+                                       context_.sampled_rows())
+                           : GainSums{};
+    });
+    if (Team* team = context_.band.team(); team && !sums.empty())
+      team->sum(Talk::light, {sums.front().data(), sums.size() * sums.front().size()});
+    for (size_t i = 0; i < frames.size(); ++i)
+      if (goes_on[i]) goes_on[i] = refine_gain(sums[i], &gain_of(i));
+  }
+}
+
+// The gains of all frames of the window: those between the snapshots have a light of their own.
+std::vector<Gain> WindowSolve::gains_of_frames(const GridFrames& background, int at) {
+  const SnapshotRange& all = window_->all;
+  const int stride = window_->stride;
+  if (stride == 1) return gains_;
+  std::vector<int> lit;
+  std::vector<Gain> gains(static_cast<size_t>(all.size()), kSameLight);
+  for (int t = 0; t < all.size(); ++t) {
+    Gain& gain = gains[static_cast<size_t>(t)];
+    const auto before = static_cast<size_t>(t / stride);
+    gain = gains_[before];
+    if (t % stride == 0) continue;
+    gain = light_between(context_.room.frames->cells(), all.slot(t), background, at, gains_[before],
+                         gains_[std::min(before + 1, gains_.size() - 1)]);
+    if (is_lit(gain)) lit.push_back(t);
+  }
+  refine_gains(all, lit, &gains);
+  return gains;
+}
+
+}  // namespace qdmd

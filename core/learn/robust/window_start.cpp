@@ -1,0 +1,166 @@
+// The start of a window's solve: a background picture of the frames that show it.
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include "core/learn/robust/window_solve.h"
+
+namespace qdmd {
+namespace {
+
+// Levels, of each spread in steps of 1/4 level.
+using Limits = std::array<uint8_t, 256>;
+
+Limits limits_of_spreads(int spreads, int least) {
+  Limits limits;
+  for (int wide = 0; wide < 256; ++wide)
+    limits[static_cast<size_t>(wide)] =
+        static_cast<uint8_t>(std::clamp((spreads * wide + 3) / 4, least, 255));
+  return limits;
+}
+
+}  // namespace
+
+// The frames and what was seen before, in the light of this window.
+WindowSolve::Looks WindowSolve::gather(const Known& known) {
+  const SnapshotRange& snapshots = window_->snapshots;
+  const size_t cells = context_.grid.cells();
+  const GridFrames& of_frames = context_.room.frames->cells();
+  const FrameMemory& memory = *known.memory;
+  const int m = snapshots.size();
+  GridPictures frames(cells);
+  frames.reserve(m);
+  for (int t = 0; t < m; ++t) frames.add(of_frames.plane(snapshots.slot(t), 0));
+  Looks looks;
+  const int old = looks.old = memory.older_than(window_->first);
+  GridFrames here;
+  const bool recalls = old > 0 || known.earlier->known();
+  gains_ = light_of(frames, m, context_.room.pool, recalls ? &here : nullptr);
+
+  const int of_window = std::min(m, context_.parameters.start_frames);
+  looks.count = of_window + old;
+  looks.pictures.resize(static_cast<size_t>(looks.count));
+  if (old > 0) {
+    std::vector<LightScratch> scratch;
+    for (size_t i = 0; i < context_.room.pool->threads(); ++i) scratch.emplace_back(cells);
+    context_.room.pool->run(static_cast<size_t>(old), [&](size_t i, size_t worker) {
+      const int k = static_cast<int>(i);
+      looks.pictures[i] = {{memory.plane(k, 0), memory.plane(k, 1), memory.plane(k, 2)},
+                           light_over(memory.cells(), memory.slot(k), here, 0, &scratch[worker]),
+                           memory.shape()};
+    });
+    for (int k = 0; k < old; ++k) {
+      looks.cells.push_back(memory.cells().plane(memory.slot(k), 0));
+      looks.numbers.push_back(memory.number(k));
+    }
+  }
+  for (int i = 0; i < of_window; ++i) {
+    const int t = static_cast<int>(int64_t{i} * m / of_window);
+    looks.pictures[static_cast<size_t>(old + i)] = {
+        {snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
+        gains_[static_cast<size_t>(t)],
+        snapshots.shape()};
+    looks.cells.push_back(frames.plane(t, 0));
+    looks.numbers.push_back(window_->number(t));
+  }
+  if (!known.earlier->known()) return looks;
+  LightScratch scratch(cells);
+  const GridFrames& earlier = known.earlier->cells();
+  looks.pictures.push_back(known.earlier->picture(light_over(earlier, 0, here, 0, &scratch)));
+  looks.cells.push_back(earlier.plane(0, 0));
+  looks.recollection = known.earlier->recollection(context_.parameters.earlier_share *
+                                                   static_cast<float>(looks.count));
+  looks.recollection.older_frames = old;
+  if (known.history->young()) looks.recollection.share.clear();
+  return looks;
+}
+
+// The background picture of the stable frames, its thresholds, and the light of each frame.
+void WindowSolve::start(const Known& known) {
+  const Looks looks = gather(known);
+  const size_t cells = context_.grid.cells();
+  // Cells in unit light: as they are, where that is theirs. Memory that nobody needs is not
+  // touched.
+  const size_t of_picture = kChannels * cells;
+  const auto unlit = std::make_unique_for_overwrite<float[]>(looks.pictures.size() * of_picture);
+  GridPictures chosen(cells);
+  chosen.reserve(static_cast<int>(looks.pictures.size()));
+  for (size_t i = 0; i < looks.pictures.size(); ++i) {
+    const Gain& gain = looks.pictures[i].gain;
+    if (!is_lit(gain)) {
+      chosen.add(looks.cells[i]);
+      continue;
+    }
+    float* const to = unlit.get() + i * of_picture;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const float inverse = 1 / gain[c];
+      const float* const channel = looks.cells[i] + c * cells;
+      std::transform(channel, channel + cells, to + c * cells,
+                     [inverse](float level) { return level * inverse; });
+    }
+    chosen.add(to);
+  }
+  const bool recalls = known.earlier->known();
+  const FirstLooks first_looks = known.history->first_looks(looks.numbers, recalls);
+  stable_ = find_stable_frames(context_.grid, chosen, looks.count,
+                               recalls ? &looks.recollection : nullptr, context_.room.pool,
+                               first_looks, &stable_room_, known.history->held());
+  if (stable_.another_scene && looks.old > 0) {
+    known.memory->forget();
+    known.earlier->forget();
+    start(known);
+    return;
+  }
+  start_frames_ = looks.count;
+  take_background(looks, *known.earlier);
+}
+
+void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earlier) {
+  uint8_t* background[kChannels];
+  for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
+  std::vector<uint8_t> spread(context_.pixels());
+  median_picture(context_.grid, context_.band, stable_, looks.pictures, context_.room.pool,
+                 background, spread.data());
+  recall_spread(earlier, &spread);
+  blur(spread.data(), reference_.width, reference_.height, context_.room.pool, spread_.data());
+  const RobustParameters& parameters = context_.parameters;
+  const Limits threshold = limits_of_spreads(parameters.spreads, parameters.least_threshold);
+  Limits reach;
+  for (int wide = 0; wide < 256; ++wide)
+    reach[static_cast<size_t>(wide)] =
+        static_cast<uint8_t>(std::max((wide + 4) / 8, parameters.least_reach));
+  in_runs([&](size_t first, size_t size) {
+    for (size_t p = first; p < first + size; ++p) {
+      reference_.threshold[p] = threshold[spread_[p]];
+      reach_[p] = reach[spread_[p]];
+    }
+  });
+}
+
+// One picture has no spread: the one that an earlier window found.
+void WindowSolve::recall_spread(const EarlierWindow& earlier, std::vector<uint8_t>* spread) const {
+  if (!earlier.known()) return;
+  for (int row = 0; row < context_.grid.rows; ++row)
+    for (int col = 0; col < context_.grid.cols; ++col) {
+      const auto frames = stable_.of_cell[static_cast<size_t>(row * context_.grid.cols + col)];
+      if (frames.size() > 1 || frames.front() != start_frames_) continue;
+      for (int y = std::max(context_.grid.top(row) - context_.band.first(), 0);
+           y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
+           ++y) {
+        const ptrdiff_t start = static_cast<ptrdiff_t>(y) * context_.grid.width;
+        std::copy(earlier.spread().begin() + start + context_.grid.left(col),
+                  earlier.spread().begin() + start + context_.grid.left(col + 1),
+                  spread->begin() + start + context_.grid.left(col));
+      }
+    }
+}
+
+void WindowSolve::write_limits(uint8_t* limits) {
+  const RobustParameters& parameters = context_.parameters;
+  const Limits limit = limits_of_spreads(parameters.spreads, parameters.least_limit);
+  in_runs([&](size_t first, size_t size) {
+    for (size_t p = first; p < first + size; ++p) limits[p] = limit[spread_[p]];
+  });
+}
+
+}  // namespace qdmd
