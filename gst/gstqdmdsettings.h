@@ -1,0 +1,44 @@
+// What an application asks of qdmdbackground, as GObject properties.
+#pragma once
+
+#include <gst/gst.h>
+
+#include <bitset>
+
+#include "core/engine/engine_options.h"
+#include "core/engine/wishes.h"
+#include "core/foreground/picture.h"
+
+namespace qdmd {
+
+inline EngineOptions with_stabilize(Stabilize stabilize) {
+  EngineOptions options;
+  options.stabilize = stabilize;
+  return options;
+}
+
+// Properties of these have ids below that.
+inline constexpr guint kMostSettings = 128;
+
+struct Settings {
+  Output output = Output::background;
+  bool post_messages = false, regions = false;
+  int regions_min_area = 0;    // pixels
+  double time_budget = 0;      // milliseconds a frame; 0: no limit
+  double absorb_time = 300;    // seconds; 0: never
+  guint ignored_left_out = 0;  // rectangles that are none, or too many
+  GQuark ignored_type = 0;     // of regions of interest that are ignored, too; 0: none
+  EngineOptions engine = with_stabilize(Stabilize::translation);
+  Wishes wishes;                     // what changes while playing
+  std::bitset<kMostSettings> asked;  // what somebody has set, a bit for each id
+};
+
+enum class WhichSettings { all, without_output };
+// Installs one property for each setting; their ids are from 1 on.
+void install_settings(GObjectClass* klass, WhichSettings which);
+
+// False where no setting has this id. The caller holds the lock that protects `settings`.
+bool set_setting(Settings* settings, guint id, const GValue* value);
+bool get_setting(const Settings& settings, guint id, GValue* value);
+
+}  // namespace qdmd
