@@ -1,0 +1,190 @@
+"""Runs every program of examples/ and looks at what it leaves.
+
+Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that are built)
+"""
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import common
+
+# demo.sh installs packages and builds: continuous integration runs it after these tests.
+# subtract.cpp is built and run by tests/install, archive by tests/archive.
+KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'subtract.cpp',
+         'two_pads.cpp', 'watch.py'}
+WIDTH, HEIGHT = 320, 240
+
+root, embed, demo, two_pads = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
+examples = root / 'examples'
+
+
+def run(folder, *command, expect=0):
+    done = subprocess.run([str(word) for word in command], cwd=folder, timeout=120,
+                          capture_output=True, text=True)
+    assert done.returncode == expect, \
+        f'exit status {done.returncode}, expected {expect}\n{done.stdout}{done.stderr}'
+    assert 'Traceback' not in done.stderr, done.stderr
+    return done.stdout, done.stderr
+
+
+def check_close(one, other, most):
+    assert len(one) == len(other), f'{len(one)} and {len(other)} bytes'
+    difference = sum(abs(a - b) for a, b in zip(one, other)) / len(one)
+    assert difference < most, f'mean difference {difference:.2f} levels, at most {most} expected'
+
+
+def all_are_known(folder):
+    names = {path.name for path in examples.iterdir() if path.name != '__pycache__'}
+    assert names == KNOWN, f'no test for {names - KNOWN}, no example {KNOWN - names}'
+
+
+def embed_simulated(folder):
+    said, _ = run(folder, embed, '--frames', 200, '--plate', 'wall.png', '--save', 'sent.avi')
+    for output in ('background', 'foreground', 'mask', 'cutout'):
+        assert f'-> {output}' in said, said
+    # The wall behind the square, as embed.cpp paints it.
+    wall = bytes(value for y in range(HEIGHT) for x in range(WIDTH)
+                 for value in (60 + x % 64, 90 + y // 3, 120))
+    check_close(common.picture_of(folder / 'wall.png'), wall, 1)
+    assert common.count_frames(folder / 'sent.avi') == 200
+
+
+def embed_film(folder):
+    said, _ = run(folder, embed, '--plate', 'street.png', 'film.avi')
+    assert '3 solves' in said, said
+    assert (folder / 'street.png').stat().st_size > 1000
+
+
+def embed_errors(folder):
+    said, _ = run(folder, embed, '--help')
+    assert '--plate' in said
+    run(folder, embed, '--window-size', 1, expect=2)
+    run(folder, embed, '--no-such-option', expect=2)
+    _, errors = run(folder, embed, 'missing.avi', expect=1)
+    assert 'missing.avi' in errors, errors
+    _, errors = run(folder, embed, '--plate', 'no/folder/wall.png', expect=1)
+    assert 'no/folder' in errors, errors
+
+
+def two_pads_simulated(folder):
+    said, _ = run(folder, two_pads)
+    shares = [float(share) for share in re.findall(r's: foreground +([\d.]+) %', said)]
+    assert len(shares) == 150, said
+    assert 0.5 < sum(shares) / len(shares) < 20, said
+
+
+def two_pads_film(folder):
+    said, _ = run(folder, two_pads, 'film.avi')
+    assert said.count('foreground') > 100, said
+    _, errors = run(folder, two_pads, 'missing.avi', expect=1)
+    assert 'missing.avi' in errors, errors
+
+
+def watch_simulated(folder):
+    said, _ = run(folder, examples / 'watch.py', '--frames', 120, '--plate', 'scene.png')
+    regions = re.findall(r's: x (\d+), y (\d+), w (\d+), h (\d+), area (\d+), mean residual \d',
+                         said)
+    assert len(regions) > 50, said
+    for x, y, w, h, area in (map(int, region) for region in regions):
+        assert x + w <= WIDTH and y + h <= HEIGHT and 100 <= area <= w * h, (x, y, w, h, area)
+    truth = common.last_picture('qdmdscenesrc scene=basic truth=background num-buffers=120')
+    check_close(common.picture_of(folder / 'scene.png'), truth, 1)
+
+
+def watch_film(folder):
+    said, _ = run(folder, examples / 'watch.py', 'film.avi', '--plate', 'film.png')
+    assert said.count(' s: x ') > 50, said
+    assert (folder / 'film.png').stat().st_size > 1000
+
+
+def watch_errors(folder):
+    run(folder, examples / 'watch.py', '--help')
+    _, errors = run(folder, examples / 'watch.py', 'missing.avi', expect=1)
+    assert 'missing.avi' in errors, errors
+    _, errors = run(folder, examples / 'watch.py', '--frames', 20, '--plate', 'no/plate.png',
+                    expect=1)
+    assert 'no/plate.png' in errors, errors
+
+
+def record_motion(folder):
+    recorder = subprocess.Popen([examples / 'record.py', '--output', 'motion.mkv'], cwd=folder,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # Some hundred frames of 40 kB. A minute is for a recorder that hangs.
+    film = folder / 'motion.mkv'
+    hung = time.monotonic() + 60
+    while not film.exists() or film.stat().st_size < 4_000_000:
+        if recorder.poll() is not None or time.monotonic() > hung:
+            recorder.kill()
+            raise AssertionError('nothing is recorded: ' + ''.join(recorder.communicate()))
+        time.sleep(0.05)
+    recorder.send_signal(signal.SIGINT)
+    said, errors = recorder.communicate(timeout=60)
+    assert recorder.returncode == 0, said + errors
+    assert 'recording' in said, said
+    frames = common.count_frames(film)
+    assert frames > 50, f'{frames} frames\n{said}'
+
+
+def record_nothing(folder):
+    said, _ = run(folder, examples / 'record.py', 'qdmdscenesrc truth=background is-live=true',
+                  '--output', 'nothing.mkv', '--seconds', 4)
+    assert 'Nothing moved.' in said, said
+    assert not (folder / 'nothing.mkv').exists()
+
+
+def record_errors(folder):
+    run(folder, examples / 'record.py', '--help')
+    _, errors = run(folder, examples / 'record.py', 'v4l2src device=/dev/no-such-camera', expect=1)
+    assert 'no-such-camera' in errors, errors
+    _, errors = run(folder, examples / 'record.py', 'no-such-element', expect=1)
+    assert 'no-such-element' in errors, errors
+
+
+def run_demo(folder):
+    run(folder, demo, '--scene', 'basic', '--frames', 40, '--window-size', 20, '--output-dir', 'demo')
+    for name in ('background.png', 'separated.mp4', 'contact-sheet.png'):
+        assert (folder / 'demo' / name).stat().st_size > 1000, name
+
+
+def messages_as_documented(folder):
+    page = (root / 'docs' / 'element.md').read_text()
+    table = page.split('\n## Messages\n')[1].split('\n## ')[0]
+    documented = {name: kind for names, kind in re.findall(r'^\| (`.*`) \| (\w+)', table, re.M)
+                  for name in re.findall('`(.*?)`', names)}
+    pipeline = common.Gst.parse_launch(
+        'qdmdscenesrc num-buffers=30 ! qdmdbackground window-size=10 post-messages=true ! fakesink')
+    pipeline.set_state(common.Gst.State.PLAYING)
+    names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double',
+             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum'}
+    try:
+        for _ in range(3):
+            message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,
+                                                            common.Gst.MessageType.ELEMENT)
+            assert message, 'no message came'
+            fields = message.get_structure()
+            assert fields.get_name() == 'qdmdbackground', fields.to_string()
+            posted = {}
+            for number in range(fields.n_fields()):
+                name = fields.nth_field_name(number)
+                posted[name] = names.get(fields.get_field_type(name).name)
+            assert posted == documented, f'posted {posted}, documented {documented}'
+    finally:
+        pipeline.set_state(common.Gst.State.NULL)
+
+
+def main():
+    checks = [all_are_known, embed_simulated, embed_film, embed_errors, watch_simulated, watch_film,
+              watch_errors, record_motion, record_nothing, record_errors, messages_as_documented,
+              two_pads_simulated, two_pads_film, run_demo]
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        common.make_film(folder / 'film.avi')
+        return common.report([(check.__name__.replace('_', ' '),
+                               lambda check=check: check(folder)) for check in checks])
+
+
+sys.exit(main())
