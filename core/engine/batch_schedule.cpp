@@ -22,6 +22,7 @@ bool BatchSchedule::take_in(const ImageView& frame) {
   if (queue_.pending == 0) begin_stream();
   if (!collection_) {
     collection_ = Collection{taken(), freeze()};
+    collection_->scene = std::exchange(scene_from_, std::nullopt);
     if (!waiting_) decide();
   }
   if (!take(frame)) return false;
@@ -48,6 +49,10 @@ void BatchSchedule::follow_scene() {
   Collection& window = *collection_;
   switch (scene_seen()) {
     case SceneSeen::same:
+      // It was no disturbance: all frames that show it have the background of this window.
+      if (window.scene && *window.scene < window.begin &&
+          taken() - *window.scene >= Learner::kSceneLasts)
+        begin_with(*window.scene);
       return;
     case SceneSeen::another:
       window.scene = std::max(window.begin, taken() - Learner::kSceneFrames);
@@ -62,6 +67,16 @@ void BatchSchedule::follow_scene() {
       window.scene_returns = true;
       return;
   }
+}
+
+// The window that is collected gets the last frames of the one before, which still wait.
+void BatchSchedule::begin_with(int64_t frame) {
+  Collection& window = *collection_;
+  Stretch& before = waiting_ ? *waiting_ : shown_;
+  if (frame > before.begin && frame > next_to_leave())
+    before.end = window.begin = frame;
+  else
+    window.scene = window.begin;
 }
 
 // With the newest frame: it may show what is behind the background of those that wait.
@@ -120,7 +135,12 @@ void BatchSchedule::add_group() {
 
 // The window that is collected waits from now on, and is solved.
 void BatchSchedule::end_window(bool at_once) {
-  const Collection window = *std::exchange(collection_, std::nullopt);
+  Collection window = *std::exchange(collection_, std::nullopt);
+  // It may be a disturbance, which the next window will know, if that is long enough.
+  if (window_size_ > Learner::kSceneLasts && window.scene && !window.scene_returns && !break_ &&
+      taken() - *window.scene < Learner::kSceneLasts)
+    scene_from_ = std::exchange(window.scene, std::nullopt);
+  if (window.scene && *window.scene < window.begin) window.scene = window.begin;
   waiting_ =
       Stretch{window.begin, taken(), window.begin, window.scene ? State::learnt : window.state};
   waiting_->begins_scene = window.scene.has_value();
@@ -213,6 +233,7 @@ void BatchSchedule::restart() {
   waiting_.reset();
   collection_.reset();
   loaded_.reset();
+  scene_from_.reset();
   break_ = put_off_ = false;
   history_from_ = taken();
   shown_ = {taken(), taken(), taken()};

@@ -76,6 +76,7 @@ class BatchSchedule : public Schedule {
 
   void look_ahead();
   void follow_scene();
+  void begin_with(int64_t frame);
   void begin_stream();
   void decide();
   void add_group();
@@ -93,6 +94,8 @@ class BatchSchedule : public Schedule {
   std::optional<Stretch> waiting_;
   std::optional<Collection> collection_;
   std::optional<Loaded> loaded_;
+  // The first frame of another scene, or of a disturbance, that a window before ended in.
+  std::optional<int64_t> scene_from_;
   std::optional<Work> work_;
   bool put_off_ = false;  // until the window's first frame leaves
 };
