@@ -9,8 +9,8 @@
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/soft_mask.h"
 #include "core/foreground/specks.h"
-#include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/clutter.h"
+#include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/light.h"
 #include "core/learn/robust/scene_watch.h"
 #include "core/learn/robust/stable_frames.h"
@@ -61,7 +61,8 @@ TEST_P(PartsMemory, OfAPicture) {
   const Grid grid(width, height);
   expect("SceneWatch", SceneWatch::bytes(grid), [&] { SceneWatch part(grid); });
   expect("StandingLooks", StandingLooks::bytes(grid), [&] { StandingLooks part(grid); });
-  expect("HistoryStarts", HistoryStarts::bytes(grid.cells()), [&] { HistoryStarts part(grid.cells()); });
+  expect("HistoryStarts", HistoryStarts::bytes(grid.cells()),
+         [&] { HistoryStarts part(grid.cells()); });
   expect("LightScratch", LightScratch::bytes(grid.cells()),
          [&] { LightScratch part(grid.cells()); });
   expect("Restorer", Restorer::bytes(width, height), [&] { Restorer part(width, height); });
