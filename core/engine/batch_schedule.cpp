@@ -51,7 +51,7 @@ void BatchSchedule::follow_scene() {
     case SceneSeen::same:
       // It was no disturbance: all frames that show it have the background of this window.
       if (window.scene && *window.scene < window.begin &&
-          taken() - *window.scene >= Learner::kSceneLasts)
+          taken() - *window.scene >= steps::scene::kLasts)
         begin_with(*window.scene);
       return;
     case SceneSeen::another:
@@ -63,7 +63,7 @@ void BatchSchedule::follow_scene() {
       if (window.scene && !window.scene_returns)
         window.scene.reset();
       else if (!window.scene)
-        window.scene = std::max(window.begin, taken() - Learner::kReturnFrames);
+        window.scene = std::max(window.begin, taken() - steps::scene::kReturn);
       window.scene_returns = true;
       return;
   }
@@ -137,8 +137,8 @@ void BatchSchedule::add_group() {
 void BatchSchedule::end_window(bool at_once) {
   Collection window = *std::exchange(collection_, std::nullopt);
   // It may be a disturbance, which the next window will know, if that is long enough.
-  if (window_size_ > Learner::kSceneLasts && window.scene && !window.scene_returns && !break_ &&
-      taken() - *window.scene < Learner::kSceneLasts)
+  if (window_size_ > steps::scene::kLasts && window.scene && !window.scene_returns && !break_ &&
+      taken() - *window.scene < steps::scene::kLasts)
     scene_from_ = std::exchange(window.scene, std::nullopt);
   if (window.scene && *window.scene < window.begin) window.scene = window.begin;
   waiting_ =

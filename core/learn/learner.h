@@ -143,9 +143,7 @@ class Learner {
   // of the background in use, or another one. What is not the same is said once, until there is a
   // background of that scene.
   virtual SceneSeen scene_of(int /*slot*/) { return SceneSeen::same; }
-  static constexpr int kSceneFrames = steps::scene::kFrames, kReturnFrames = 2;
-  // What was shown for fewer frames when a window ends (batch) may be a disturbance.
-  static constexpr int kSceneLasts = 30;
+  static constexpr int kSceneFrames = steps::scene::kFrames;
   // Solves to come know nothing of what was before; the background in use stays. Not while one
   // runs.
   // returns: it is the scene that was left last, and what was known of it is known again.

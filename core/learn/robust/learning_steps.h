@@ -168,6 +168,10 @@ QDMD_STEP double kFlat = step("scene.flat", 2.0);
 constexpr size_t kTilesAlong = 4;
 // So many frames that look like each other, and not like the background, are another scene.
 constexpr int kFrames = 8;
+// Frames in a row that show the scene before are its return.
+QDMD_STEP int kReturn = step("scene.return", 2);
+// Frames: what was shown for fewer when a window ends (batch) may be a disturbance.
+QDMD_STEP int kLasts = step("scene.lasts", 30);
 }  // namespace scene
 
 // ---- The memory of frames ----

@@ -169,16 +169,13 @@ bool SceneMemory::left_beside(const std::vector<int>& region) const {
 }
 
 bool SceneMemory::came_beside(const std::vector<int>& region) const {
-  size_t beside = 0;
-  for (int cell : region) {
-    bool found = false;
+  bool found = false;
+  for (int cell : region)
     each_near(cell, 1, [&](int near) {
       const auto at = static_cast<size_t>(near);
       found |= of_[at] == Of::came && since_[at] >= looks_.since(near);
     });
-    beside += found;
-  }
-  return beside > 0;
+  return found;
 }
 
 // True where looks came with that frame, or one next to it, in many places of the picture.

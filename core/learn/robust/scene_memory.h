@@ -32,15 +32,20 @@ struct Proofs {
 //             through them. So things pass there before the change, or after it.
 //   contours  what stands before something else ends in an edge, which what is behind does not have
 //             (contours_of: in full resolution).
-// | proof                                                             | what the region is |
-// |-------------------------------------------------------------------|--------------------|
-// | the background's contour is stronger, and motion does not say     | left               |
-// |   the contrary; all around has settled                            |                    |
-// | much stronger, and nothing settles for kMoves frames more         | left               |
-// | a few cells beside what has just left                             | left               |
-// | most of the picture differs, for kLasts frames                    | left: it is no object |
-// | anything else                                                     | came: the older look stays
-// |
+// | what frames show                                                   | what the region is      |
+// |--------------------------------------------------------------------|-------------------------|
+// | the background's contour is stronger, motion does not say the      | left                    |
+// |   contrary, and all around has settled                             |                         |
+// | much stronger, and nothing has settled for 2 kMoves frames         | left                    |
+// | both proofs are clear (kClear, kClearBoth), in a larger region     | left, at once           |
+// | a few cells beside what left, which changed when that did          | left                    |
+// | it lies beside what came: the background's contour must be much    | left                    |
+// |   stronger                                                         |                         |
+// | looks came all over the picture at once, and nothing went there    | nothing, for kLasts     |
+// | most of the picture differs                                        | nothing, for kLasts;    |
+// |                                                                    |   then left: no object  |
+// | anything else, for 3 kMoves frames                                 | came: older look stays  |
+// | the scene is young (mode=live)                                     | contours alone decide   |
 class SceneMemory {
  public:
   SceneMemory() = default;

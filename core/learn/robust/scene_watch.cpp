@@ -126,7 +126,7 @@ bool SceneWatch::is_back(const float* const frame[3]) {
   next_ = (next_ + 1) % kFrames;
   find_edges(frame, &newest);
   returned_ = look_of(newest, left_) == Look::same ? returned_ + 1 : 0;
-  return returned_ >= 2;
+  return returned_ >= steps::scene::kReturn;
 }
 
 SceneSeen SceneWatch::follow(const float* const frame[3], const float* const background[3]) {
@@ -139,7 +139,7 @@ SceneSeen SceneWatch::follow(const float* const frame[3], const float* const bac
   strange_ = look == Look::strange ? strange_ + 1 : 0;
   const bool returned = look != Look::same && left_known_ && look_of(newest, left_) == Look::same;
   returned_ = returned ? returned_ + 1 : 0;
-  if (returned_ == 2) return SceneSeen::the_one_before;
+  if (returned_ == steps::scene::kReturn) return SceneSeen::the_one_before;
   return strange_ >= kFrames && alike(newest, frames_[next_]) ? SceneSeen::another
                                                               : SceneSeen::same;
 }

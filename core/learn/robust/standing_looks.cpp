@@ -188,23 +188,23 @@ void StandingLooks::take_next(size_t at) {
   }
 }
 
-const std::vector<int>& StandingLooks::uncovered(const float* const background[3],
-                                                 const Counts& counts) {
+const std::vector<int>& StandingLooks::uncovered(const float* const background[3]) {
   found_.clear();
-  news_ = differing_ = 0;
+  news_ = 0;
+  size_t differing = 0;
   if (std::min(grid_.rows, grid_.cols) < 4) return found_;
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
   for (size_t cell = 0; cell < grid_.cells(); ++cell) {
     differs_[cell] = differs_at(look, background, cell) && shows(cell);
-    differing_ += differs_[cell];
+    differing += differs_[cell];
     news_ += differs_[cell] && number_ - cells_[cell].look.since < kNewsFrames;
   }
-  if (differing_ < kLeastRegion) return found_;
+  if (differing < kLeastRegion) return found_;
   CellRegions regions(grid_);
   const auto& found = regions.find(differs_);
   for (size_t region = 0; region < found.size(); ++region)
-    if (found[region].size() >= kLeastRegion && (!counts || counts(found[region])) &&
+    if (found[region].size() >= kLeastRegion &&
         Contour(grid_, regions, static_cast<int>(region), found[region])
             .is_weaker(look, background))
       found_.insert(found_.end(), found[region].begin(), found[region].end());

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -75,17 +74,12 @@ class StandingLooks {
   // Good until the next call of either:
   // What was uncovered: cells whose look has lasted for kSteady frames and is not the background's,
   // in regions where the background has the stronger contour.
-  // counts: null, or what says of a region of such cells whether it may be one.
-  using Counts = std::function<bool(const std::vector<int>& region)>;
-  const std::vector<int>& uncovered(const float* const background[3],
-                                    const Counts& counts = nullptr);
+  const std::vector<int>& uncovered(const float* const background[3]);
   // Takes out of a list of cells those that show something else than their look in more than one,
   // or in half, of the frames that lie in these slots of `frames`, each in its own light: somebody
   // passes there.
   void leave_out_hidden(const GridFrames& frames, std::span<const LitSlot> slots,
                         std::vector<int>* of) const;
-  // Cells whose look was not the background's in the last uncovered().
-  size_t differing() const { return differing_; }
   // True where uncovered() saw enough cells whose look is not the background's and has come within
   // the last kNewsFrames frames, be it uncovered or something that stops.
   bool any_news() const { return news_ >= kLeastNews; }
@@ -126,7 +120,7 @@ class StandingLooks {
   std::vector<uint64_t> passed_;       // a bit a cell, kHistory frames
   std::vector<uint8_t> differs_;
   std::vector<int> found_;
-  size_t news_ = 0, differing_ = 0;
+  size_t news_ = 0;
 };
 
 }  // namespace qdmd
