@@ -37,8 +37,9 @@ float agreement(const float* const frame[3], const float* const reference[3], si
 }
 
 // The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
+// 1 without a look at these, where that mode is nearer to 1 than `still`, a logarithm.
 Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells,
-                 LightScratch* scratch) {
+                 LightScratch* scratch, float still = 0) {
   constexpr int kBins = 300;
   constexpr float kLowest = -3;
   std::array<int, kBins + 4> histogram{};
@@ -60,6 +61,7 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
     if (smooth > most) most = smooth, best = bin;
   }
   const float mode = kLowest + (static_cast<float>(best) + 0.5f) * kBin;
+  if (std::abs(mode) < still) return kSameLight;
   Gain gain = kSameLight;
   auto& near = scratch->near;
   for (size_t c = 0; c < kChannels; ++c) {
@@ -83,11 +85,11 @@ struct CellPlanes {
 };
 
 Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
-               LightScratch* scratch) {
+               LightScratch* scratch, float still = 0) {
   const float before = agreement(frame.of, background.of, cells, kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
-  const Gain gain = shared_gain(frame.of, background.of, cells, scratch);
+  const Gain gain = shared_gain(frame.of, background.of, cells, scratch, still);
   const float after = agreement(frame.of, background.of, cells, gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
@@ -107,8 +109,9 @@ Gain without_noise(const Gain& gain) {
 
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch) {
+  // without_noise() takes so little for none.
   return without_noise(
-      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
+      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch, kBin));
 }
 
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
