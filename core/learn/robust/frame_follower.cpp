@@ -18,6 +18,7 @@ void FrameFollower::begin() {
   const Grid& grid = context_.grid;
   const Models models = context_.room.models;
   background_cells_ = GridFrames(grid, 2);
+  unclipped_ = GridFrames(grid, 1);
   light_scratch_ = LightScratch(grid.cells());
   // Frames that wait can wait for a proof.
   if (context_.follows(models))
@@ -29,7 +30,7 @@ void FrameFollower::begin() {
 
 uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
   const Grid& grid = context.grid;
-  return GridFrames::bytes(grid, 2) + LightScratch::bytes(grid.cells()) +
+  return GridFrames::bytes(grid, 3) + LightScratch::bytes(grid.cells()) +
          (context.follows(models) ? SceneMemory::bytes(grid) : 0) +
          (models == Models::two_of_live ? 0 : StandingLooks::bytes(grid)) +
          HistoryStarts::bytes(grid.cells()) + SceneWatch::bytes(grid);
@@ -68,6 +69,19 @@ bool FrameFollower::is_calm() const {
   }
   const auto cells = static_cast<double>(context_.grid.cells());
   return sum < kCalmMean * cells && static_cast<double>(moved) < kMostMoved * cells;
+}
+
+// The cells of a frame; where its light is another one, without what samples at the end of their
+// range hide.
+FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light) {
+  const Cells shown(context_.room.frames->cells(), slot);
+  if (!is_lit(light)) return shown;
+  const Cells background = this->background();
+  for (size_t c = 0; c < kChannels; ++c)
+    for (size_t cell = 0; cell < context_.grid.cells(); ++cell)
+      unclipped_.plane(0, static_cast<int>(c))[cell] =
+          unclipped(shown.of[c][cell], background.of[c][cell], light[c]);
+  return {unclipped_, 0};
 }
 
 SceneSeen FrameFollower::scene_of(int slot) {

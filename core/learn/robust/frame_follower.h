@@ -72,6 +72,7 @@ class FrameFollower {
     operator const float* const*() const { return of; }
   };
   Cells background() const { return {background_cells_, published_}; }
+  Cells unclipped_cells(int slot, const Gain& light);
   bool is_calm() const;
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
                        const BackgroundModel* of_window);
@@ -87,6 +88,7 @@ class FrameFollower {
 
   const RobustContext& context_;
   GridFrames background_cells_;
+  GridFrames unclipped_;  // of a frame
   int published_ = 0;
   LightScratch light_scratch_;
   SceneMemory memory_;   // what frames that came showed

@@ -23,6 +23,16 @@ namespace light {
 QDMD_STEP float kAgree = step("light.agree", 4.0f);
 // Levels: cells too dark or too bright have no ratio.
 QDMD_STEP float kDark = step("light.dark", 8.0f), kBright = step("light.bright", 250.0f);
+// Levels: the mean of a cell whose samples are mostly at the end of their range, and say no more
+// than "at least"; brighter cells than the second may have such samples. Where so large a share of
+// a frame's cells is at the end, gains are those of the darker ones.
+QDMD_STEP float kAtEnd = step("light.at_end", 245.0f), kNearEnd = step("light.near_end", 200.0f);
+QDMD_STEP float kEnds = step("light.ends", 0.01f);
+// A window whose light changes by this factor while samples are at the end of their range is looked
+// at in the light of its darker frames: where this share of them is darker, and no darker than this
+// share of the usual light.
+QDMD_STEP float kSwings = step("light.swings", 1.08f), kDarker = step("light.darker", 0.1f);
+QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
 // A gain must make this many times as many cells agree, and this share of all cells besides.
 QDMD_STEP float kGrowth = step("light.growth", 1.3f), kShare = step("light.share", 0.1f);
 // Frames are divided by gains: the least one.

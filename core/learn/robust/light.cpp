@@ -23,17 +23,34 @@ float gray(const float* const planes[3], size_t cell) {
   return (planes[0][cell] + planes[1][cell] + planes[2][cell]) / 3;
 }
 
+// The brightest channel of a cell.
+float brightest(const float* const planes[3], size_t cell) {
+  return std::max({planes[0][cell], planes[1][cell], planes[2][cell]});
+}
+
 // Share of cells where frame / gain and reference agree.
 float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
                 const Gain& gain) {
+  const Gain inverse = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
   size_t agree = 0;
   for (size_t cell = 0; cell < cells; ++cell) {
     float difference = 0;
-    for (size_t c = 0; c < kChannels; ++c)
-      difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
+    for (size_t c = 0; c < kChannels; ++c) {
+      const float away = frame[c][cell] * inverse[c] - reference[c][cell];
+      // A sample at the end of its range agrees with all that is brighter.
+      const bool at_least = frame[c][cell] >= kAtEnd && away < 0;
+      difference += at_least ? 0 : std::abs(away);
+    }
     if (difference < 3 * kAgree) ++agree;
   }
   return static_cast<float>(agree) / static_cast<float>(cells);
+}
+
+// The share of cells with samples at the end of their range.
+float share_at_end(const float* const frame[3], size_t cells) {
+  size_t found = 0;
+  for (size_t cell = 0; cell < cells; ++cell) found += brightest(frame, cell) >= kAtEnd;
+  return static_cast<float>(found) / static_cast<float>(cells);
 }
 
 // The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
@@ -45,9 +62,12 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   std::array<int, kBins + 4> histogram{};
   auto& ratios = scratch->ratios;
   ratios.clear();
+  const bool clips = share_at_end(frame, cells) > kEnds || share_at_end(reference, cells) > kEnds;
   for (size_t cell = 0; cell < cells; ++cell) {
     const float f = gray(frame, cell), r = gray(reference, cell);
     if (f <= kDark || r <= kDark || f >= kBright || r >= kBright) continue;
+    if (clips && (brightest(frame, cell) > kNearEnd || brightest(reference, cell) > kNearEnd))
+      continue;
     const float ratio = std::log(f / r);
     ratios.emplace_back(ratio, cell);
     const int bin = static_cast<int>((ratio - kLowest) / kBin);
@@ -131,6 +151,18 @@ Gain light_between(const GridFrames& frames, int frame, const GridFrames& backgr
 
 namespace {
 
+// The numbers of the darker half of the frames, in time order.
+std::vector<size_t> darker_half(const std::vector<Gain>& gains) {
+  std::vector<float> light;
+  for (const Gain& gain : gains) light.push_back(brightness(gain));
+  std::vector<float> sorted = light;
+  const float middle = median(&sorted);
+  std::vector<size_t> found;
+  for (size_t t = 0; t < light.size(); ++t)
+    if (light[t] <= middle) found.push_back(t);
+  return found;
+}
+
 bool changes(const Gain& gain) { return std::abs(std::log(brightness(gain))) > kStill; }
 
 // Frames 0 .. count - 1 of some pictures, compared by the threads of a pool.
@@ -195,7 +227,13 @@ class FramesOfLight {
   // Each cell's median over the frames (kMedianRows of them at most) in unit light.
   const GridFrames& median(const std::vector<Gain>& gains) {
     if (median_gains_ == gains) return median_;
-    const size_t used = std::min<size_t>(count_, kMedianRows);
+    std::vector<size_t> all(count_);
+    std::iota(all.begin(), all.end(), size_t{0});
+    return median(gains, all);
+  }
+  // The same of these frames.
+  const GridFrames& median(const std::vector<Gain>& gains, const std::vector<size_t>& of) {
+    const size_t used = std::min<size_t>(of.size(), kMedianRows);
     constexpr size_t kTogether = 512;
     const size_t parts = (cells() + kTogether - 1) / kTogether;
     for_each(kChannels * parts, [&](size_t part, size_t) {
@@ -203,7 +241,7 @@ class FramesOfLight {
       const float* rows[kMedianRows];
       float divisors[kMedianRows];
       for (size_t i = 0; i < used; ++i) {
-        const size_t t = i * count_ / used;
+        const size_t t = of[i * of.size() / used];
         rows[i] = planes(t).of[c] + first;
         divisors[i] = gains[t][c];
       }
@@ -213,9 +251,22 @@ class FramesOfLight {
     median_gains_ = gains;
     return median_;
   }
-  GridFrames take_median(const std::vector<Gain>& gains) {
-    median(gains);
+  // darker: of the darker half of the frames.
+  GridFrames take_median(const std::vector<Gain>& gains, bool darker) {
+    if (darker)
+      median(gains, darker_half(gains));
+    else
+      median(gains);
     return std::move(median_);
+  }
+
+  // True where samples are at the end of their range while light changes.
+  bool clips(const std::vector<Gain>& gains) {
+    const auto [least, most] = std::minmax_element(
+        gains.begin(), gains.end(),
+        [](const Gain& a, const Gain& b) { return brightness(a) < brightness(b); });
+    if (brightness(*most) < kSwings * brightness(*least)) return false;
+    return share_at_end(planes(static_cast<size_t>(most - gains.begin())).of, cells()) > kEnds;
   }
 
  private:
@@ -238,14 +289,29 @@ class FramesOfLight {
   std::vector<Gain> median_gains_;  // with which it was made
 };
 
+// Makes gains those over the light of the darker frames.
+void darken(std::vector<Gain>* gains) {
+  std::vector<Gain> sorted = *gains;
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Gain& a, const Gain& b) { return brightness(a) < brightness(b); });
+  const float usual = brightness(sorted[sorted.size() / 2]);
+  auto at = static_cast<size_t>(kDarker * static_cast<float>(sorted.size()));
+  while (at < sorted.size() / 2 && brightness(sorted[at]) < kDarkest * usual) ++at;
+  const Gain unit = sorted[at];
+  for (Gain& gain : *gains) {
+    for (size_t c = 0; c < kChannels; ++c) gain[c] /= unit[c];
+    gain = without_noise(gain);
+  }
+}
+
 }  // namespace
 
-std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool, GridFrames* median) {
+WindowLight light_of(const GridPictures& frames, int count, Pool* pool, GridFrames* median) {
   FramesOfLight all(frames, count, pool);
   if (count < 2) {
     std::vector<Gain> same(static_cast<size_t>(count), kSameLight);
-    if (median) *median = all.take_median(same);
-    return same;
+    if (median) *median = all.take_median(same, false);
+    return {same, false};
   }
   std::vector<Gain> gains = all.over_median();
   const float agree = all.mean_agreement(gains);
@@ -258,9 +324,14 @@ std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool, Gr
       if (better > std::max(kLeastFollowed, agree + kFollowed)) gains = std::move(followed);
     }
   }
-  if (std::any_of(gains.begin(), gains.end(), is_lit)) settle_light(&gains);
-  if (median) *median = all.take_median(gains);
-  return gains;
+  const bool lit = std::any_of(gains.begin(), gains.end(), is_lit);
+  const bool clips = lit && all.clips(gains);
+  if (clips)
+    darken(&gains);
+  else if (lit)
+    settle_light(&gains);
+  if (median) *median = all.take_median(gains, clips);
+  return {gains, clips};
 }
 
 uint64_t light_of_bytes(const Grid& grid, int threads) {

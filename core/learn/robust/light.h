@@ -5,18 +5,27 @@
 #include <utility>
 #include <vector>
 
+#include "core/learn/robust/learning_steps.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
+
+// The light of a window's frames.
+struct WindowLight {
+  std::vector<Gain> gains;
+  // Samples are at the end of their range in some of the frames, and the light changes: unit light
+  // is that of the darker frames, in which fewer are.
+  bool clips = false;
+};
 
 // The gains of frames 0 .. count - 1 over their common background: 1 where a change of light does
 // not explain what the frame and the background differ in, so that what moves counts as no light.
 // Small changes around the light of most frames are left out: they are noise. median: becomes each
 // cell's median over the frames (64 of them at most) in unit light, as frame 0; or null. pool: null
 // for one thread.
-std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool = nullptr,
-                           GridFrames* median = nullptr);
+WindowLight light_of(const GridPictures& frames, int count, Pool* pool = nullptr,
+                     GridFrames* median = nullptr);
 // The bytes that it takes.
 uint64_t light_of_bytes(const Grid& grid, int threads);
 
@@ -46,6 +55,16 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
 // little, one of them.
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after);
+
+// What a cell shows in a frame with this gain, where `background` is what is behind it in unit
+// light: `level`, or, where samples at the end of their range say no more than that it is brighter
+// (darker) than they are, the background in that light.
+inline float unclipped(float level, float background, float gain) {
+  using namespace steps::light;
+  const float expected = background * gain;
+  if (level >= kNearEnd && expected > level) return expected;
+  return background >= kAtEnd && gain < 1 && level > expected ? expected : level;
+}
 
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.

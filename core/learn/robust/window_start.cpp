@@ -33,9 +33,10 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   for (int t = 0; t < m; ++t) frames.add(of_frames.plane(snapshots.slot(t), 0));
   Looks looks;
   const int old = looks.old = memory.older_than(window_->first);
-  GridFrames here;
-  const bool recalls = old > 0 || known.earlier->known();
-  gains_ = light_of(frames, m, context_.room.pool, recalls ? &here : nullptr);
+  GridFrames& here = looks.median;
+  WindowLight light = light_of(frames, m, context_.room.pool, &here);
+  gains_ = std::move(light.gains);
+  clips_ = light.clips;
 
   const int of_window = std::min(m, context_.parameters.start_frames);
   looks.count = of_window + old;
@@ -97,6 +98,10 @@ void WindowSolve::start(const Known& known) {
       const float* const channel = looks.cells[i] + c * cells;
       std::transform(channel, channel + cells, to + c * cells,
                      [inverse](float level) { return level * inverse; });
+      if (!clips_) continue;
+      const float* const behind = looks.median.plane(0, static_cast<int>(c));
+      for (size_t cell = 0; cell < cells; ++cell)
+        to[c * cells + cell] = unclipped(channel[cell], behind[cell], gain[c]) * inverse;
     }
     chosen.add(to);
   }
@@ -112,7 +117,31 @@ void WindowSolve::start(const Known& known) {
     return;
   }
   start_frames_ = looks.count;
+  if (clips_) prefer_darker(looks);
   take_background(looks, *known.earlier);
+}
+
+// Where samples may be at the end of their range, the darker half of the frames that show a cell's
+// background says what it is.
+void WindowSolve::prefer_darker(const Looks& looks) {
+  for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
+    const auto shown = stable_.of_cell[cell];
+    std::vector<float> light;
+    float most = 0;
+    for (const uint16_t frame : shown) {
+      const Gain& gain = looks.pictures[frame].gain;
+      light.push_back((gain[0] + gain[1] + gain[2]) / 3);
+      for (int c = 0; c < kChannels; ++c)
+        most = std::max(most, looks.median.plane(0, c)[cell] * gain[static_cast<size_t>(c)]);
+    }
+    if (light.size() < 2 || most < steps::light::kNearEnd) continue;
+    std::vector<float> sorted = light;
+    const auto middle = sorted.begin() + static_cast<ptrdiff_t>((sorted.size() - 1) / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    std::vector<uint8_t> keeps(looks.pictures.size());
+    for (size_t i = 0; i < light.size(); ++i) keeps[shown[i]] = light[i] <= *middle;
+    stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
+  }
 }
 
 void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earlier) {
