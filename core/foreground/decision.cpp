@@ -16,6 +16,7 @@
 #include "core/passes/residual.h"
 #include "core/passes/sampling.h"
 #include "core/passes/shading.h"
+#include "core/passes/unit_light.h"
 
 namespace qdmd {
 namespace {
@@ -207,12 +208,15 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   // Without limits of pixels, ghosts look like noise, and like textures.
   now_.means = steps_.smooth && !frame.fixed && frame.limits && frame.threshold > constants().noisy;
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
+  const Gain& light = frame.model->shown_light();
+  now_.darker = std::any_of(light.begin(), light.end(), [](float gain) { return gain < 1; });
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
   now_.whole = frame.model->depth() > 8 && !now_.means;
+  // Noise is as much brighter as the light is.
+  now_.light = frame.fixed ? 1 : std::max(1.0f, (light[0] + light[1] + light[2]) / kChannels);
+  now_.threshold *= now_.light;
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
-  const Gain& light = frame.model->shown_light();
-  now_.darker = std::any_of(light.begin(), light.end(), [](float gain) { return gain < 1; });
   now_.level_known =
       std::exchange(picture_, frame.model->picture()) == frame.model->picture() && !now_.darker;
   if (now_.darker) picture_ = 0;
@@ -505,7 +509,8 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     }
     p = end;
   }
-  if (steps_.light && !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground) leave_shadows(run);
+  if (steps_.light && !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground)
+    leave_shadows(run);
 }
 
 // Distances and limits of a run.
@@ -527,6 +532,8 @@ void Decision::look_at(Run* run) {
   std::copy_n(limits, count, run->limit);
   if (now_.means)
     for (size_t p = 0; p < count; ++p) run->limit[p] /= 3;
+  if (now_.light > 1)
+    for (size_t p = 0; p < count; ++p) run->limit[p] = in_light(run->limit[p], now_.light);
   for (size_t p = 0; p < count; ++p) run->limit[p] = std::max(run->limit[p], least);
 }
 

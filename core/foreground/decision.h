@@ -128,6 +128,7 @@ class Decision {
     bool whole = false;  // own distances are of all bits, more than 8 (full_depth.h)
     bool below = false;  // pixels may differ that are the same in 8 bits
     double threshold = 0;
+    float light = 1;           // how much brighter the frame is than L in unit light, 1 at least
     bool level_known = false;  // L is still that of the frame before
     bool darker = false;       // a channel has less light than L in unit light
   };

@@ -28,11 +28,16 @@ QDMD_STEP float kDark = step("light.dark", 8.0f), kBright = step("light.bright",
 // a frame's cells is at the end, gains are those of the darker ones.
 QDMD_STEP float kAtEnd = step("light.at_end", 245.0f), kNearEnd = step("light.near_end", 200.0f);
 QDMD_STEP float kEnds = step("light.ends", 0.01f);
+// Levels: darker channels of cells are measured then.
+QDMD_STEP float kMeasured = step("light.measured", 240.0f);
 // A window whose light changes by this factor while samples are at the end of their range is looked
 // at in the light of its darker frames: where this share of them is darker, and no darker than this
 // share of the usual light.
 QDMD_STEP float kSwings = step("light.swings", 1.08f), kDarker = step("light.darker", 0.1f);
 QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
+// Frames that say what is behind such samples: the darkest one in so many, but so many at least.
+QDMD_STEP size_t kDarkOf = step("light.dark_of", size_t{6});
+QDMD_STEP size_t kLeastDark = step("light.least_dark", size_t{5});
 // A gain must make this many times as many cells agree, and this share of all cells besides.
 QDMD_STEP float kGrowth = step("light.growth", 1.3f), kShare = step("light.share", 0.1f);
 // Frames are divided by gains: the least one.

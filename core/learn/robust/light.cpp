@@ -28,22 +28,25 @@ float brightest(const float* const planes[3], size_t cell) {
   return std::max({planes[0][cell], planes[1][cell], planes[2][cell]});
 }
 
-// Share of cells where frame / gain and reference agree.
+// Share of cells where frame / gain and reference agree, of those that no sample at the end of its
+// range says too little of.
 float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
                 const Gain& gain) {
-  const Gain inverse = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
-  size_t agree = 0;
+  size_t agree = 0, seen = 0;
   for (size_t cell = 0; cell < cells; ++cell) {
     float difference = 0;
+    size_t at_end = 0;
     for (size_t c = 0; c < kChannels; ++c) {
-      const float away = frame[c][cell] * inverse[c] - reference[c][cell];
-      // A sample at the end of its range agrees with all that is brighter.
-      const bool at_least = frame[c][cell] >= kAtEnd && away < 0;
-      difference += at_least ? 0 : std::abs(away);
+      const bool says = frame[c][cell] < kAtEnd && reference[c][cell] < kAtEnd;
+      at_end += !says;
+      if (says) difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
     }
+    if (at_end == kChannels) continue;
+    ++seen;
     if (difference < 3 * kAgree) ++agree;
   }
-  return static_cast<float>(agree) / static_cast<float>(cells);
+  // Where all is white, nothing is known.
+  return seen < kLeastRatios ? 1 : static_cast<float>(agree) / static_cast<float>(seen);
 }
 
 // The share of cells with samples at the end of their range.
@@ -62,16 +65,21 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   std::array<int, kBins + 4> histogram{};
   auto& ratios = scratch->ratios;
   ratios.clear();
-  const bool clips = share_at_end(frame, cells) > kEnds || share_at_end(reference, cells) > kEnds;
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const float f = gray(frame, cell), r = gray(reference, cell);
-    if (f <= kDark || r <= kDark || f >= kBright || r >= kBright) continue;
-    if (clips && (brightest(frame, cell) > kNearEnd || brightest(reference, cell) > kNearEnd))
-      continue;
+  const auto see = [&](float f, float r, size_t cell, float bright) {
+    if (f <= kDark || r <= kDark || f >= bright || r >= bright) return;
     const float ratio = std::log(f / r);
     ratios.emplace_back(ratio, cell);
     const int bin = static_cast<int>((ratio - kLowest) / kBin);
     if (bin >= 0 && bin < kBins) ++histogram[static_cast<size_t>(bin) + 2];
+  };
+  // Where samples are at the end of their range, other channels of a cell still say something.
+  const bool clips = share_at_end(frame, cells) > kEnds || share_at_end(reference, cells) > kEnds;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    if (!clips) {
+      see(gray(frame, cell), gray(reference, cell), cell, kBright);
+      continue;
+    }
+    for (size_t c = 0; c < kChannels; ++c) see(frame[c][cell], reference[c][cell], cell, kMeasured);
   }
   if (ratios.size() < kLeastRatios) return kSameLight;
   int best = 0, most = -1;
@@ -87,7 +95,8 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   for (size_t c = 0; c < kChannels; ++c) {
     near.clear();
     for (const auto& [ratio, cell] : ratios)
-      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark)
+      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark &&
+          !(clips && std::max(frame[c][cell], reference[c][cell]) >= kMeasured))
         near.push_back(frame[c][cell] / reference[c][cell]);
     // A channel that is dark everywhere: the light of the others.
     gain[c] = near.empty() ? std::exp(mode) : std::max(median(&near), kLeastGain);
@@ -151,15 +160,15 @@ Gain light_between(const GridFrames& frames, int frame, const GridFrames& backgr
 
 namespace {
 
-// The numbers of the darker half of the frames, in time order.
-std::vector<size_t> darker_half(const std::vector<Gain>& gains) {
-  std::vector<float> light;
-  for (const Gain& gain : gains) light.push_back(brightness(gain));
-  std::vector<float> sorted = light;
-  const float middle = median(&sorted);
-  std::vector<size_t> found;
-  for (size_t t = 0; t < light.size(); ++t)
-    if (light[t] <= middle) found.push_back(t);
+// The numbers of the darkest frames, in time order.
+std::vector<size_t> darkest(const std::vector<Gain>& gains) {
+  std::vector<size_t> found(gains.size());
+  std::iota(found.begin(), found.end(), size_t{0});
+  std::stable_sort(found.begin(), found.end(), [&](size_t a, size_t b) {
+    return brightness(gains[a]) < brightness(gains[b]);
+  });
+  found.resize(most_darkest(found.size()));
+  std::sort(found.begin(), found.end());
   return found;
 }
 
@@ -251,10 +260,10 @@ class FramesOfLight {
     median_gains_ = gains;
     return median_;
   }
-  // darker: of the darker half of the frames.
+  // darker: of the darkest frames.
   GridFrames take_median(const std::vector<Gain>& gains, bool darker) {
     if (darker)
-      median(gains, darker_half(gains));
+      median(gains, darkest(gains));
     else
       median(gains);
     return std::move(median_);

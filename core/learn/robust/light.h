@@ -1,6 +1,7 @@
 // Global changes of light: how much brighter a frame is than another picture of the same scene.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -34,11 +35,11 @@ class LightScratch {
  public:
   LightScratch() = default;
   explicit LightScratch(size_t cells) {
-    ratios.reserve(cells);
-    near.reserve(cells);
+    ratios.reserve(kChannels * cells);
+    near.reserve(kChannels * cells);
   }
   static uint64_t bytes(uint64_t cells) {
-    return cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
+    return kChannels * cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
   }
 
   std::vector<std::pair<float, size_t>> ratios;
@@ -55,6 +56,12 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
 // little, one of them.
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after);
+
+// How many of so many frames are the darkest ones, which say what is behind samples at the end of
+// their range.
+inline size_t most_darkest(size_t frames) {
+  return std::min(frames, std::max(steps::light::kLeastDark, frames / steps::light::kDarkOf));
+}
 
 // What a cell shows in a frame with this gain, where `background` is what is behind it in unit
 // light: `level`, or, where samples at the end of their range say no more than that it is brighter

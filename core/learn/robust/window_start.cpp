@@ -121,25 +121,26 @@ void WindowSolve::start(const Known& known) {
   take_background(looks, *known.earlier);
 }
 
-// Where samples may be at the end of their range, the darker half of the frames that show a cell's
-// background says what it is.
+// Frames in which a cell's samples may be at the end of their range say nothing of its background,
+// unless there are few others: then the darkest do.
 void WindowSolve::prefer_darker(const Looks& looks) {
+  std::vector<std::pair<float, uint16_t>> order;
+  std::vector<uint8_t> keeps(looks.pictures.size());
   for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
-    const auto shown = stable_.of_cell[cell];
-    std::vector<float> light;
-    float most = 0;
-    for (const uint16_t frame : shown) {
+    order.clear();
+    std::fill(keeps.begin(), keeps.end(), uint8_t{0});
+    for (const uint16_t frame : stable_.of_cell[cell]) {
       const Gain& gain = looks.pictures[frame].gain;
-      light.push_back((gain[0] + gain[1] + gain[2]) / 3);
+      float brightest = 0;
       for (int c = 0; c < kChannels; ++c)
-        most = std::max(most, looks.median.plane(0, c)[cell] * gain[static_cast<size_t>(c)]);
+        brightest =
+            std::max(brightest, looks.median.plane(0, c)[cell] * gain[static_cast<size_t>(c)]);
+      order.emplace_back(brightest, frame);
     }
-    if (light.size() < 2 || most < steps::light::kNearEnd) continue;
-    std::vector<float> sorted = light;
-    const auto middle = sorted.begin() + static_cast<ptrdiff_t>((sorted.size() - 1) / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    std::vector<uint8_t> keeps(looks.pictures.size());
-    for (size_t i = 0; i < light.size(); ++i) keeps[shown[i]] = light[i] <= *middle;
+    std::sort(order.begin(), order.end());
+    const size_t least = most_darkest(order.size());
+    for (size_t i = 0; i < order.size(); ++i)
+      keeps[order[i].second] = i < least || order[i].first < steps::light::kNearEnd;
     stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
   }
 }
