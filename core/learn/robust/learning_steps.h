@@ -35,6 +35,9 @@ QDMD_STEP float kMeasured = step("light.measured", 240.0f);
 // share of the usual light.
 QDMD_STEP float kSwings = step("light.swings", 1.08f), kDarker = step("light.darker", 0.1f);
 QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
+// Levels: a darker frame that is so near to the darkest ones' median, a channel's mean, shows the
+// same.
+QDMD_STEP float kNearMedian = step("light.near_median", 8.0f);
 // Frames that say what is behind such samples: the darkest one in so many, but so many at least.
 QDMD_STEP size_t kDarkOf = step("light.dark_of", size_t{6});
 QDMD_STEP size_t kLeastDark = step("light.least_dark", size_t{5});

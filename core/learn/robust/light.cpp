@@ -307,10 +307,8 @@ void darken(std::vector<Gain>* gains) {
   auto at = static_cast<size_t>(kDarker * static_cast<float>(sorted.size()));
   while (at < sorted.size() / 2 && brightness(sorted[at]) < kDarkest * usual) ++at;
   const Gain unit = sorted[at];
-  for (Gain& gain : *gains) {
+  for (Gain& gain : *gains)
     for (size_t c = 0; c < kChannels; ++c) gain[c] /= unit[c];
-    gain = without_noise(gain);
-  }
 }
 
 }  // namespace

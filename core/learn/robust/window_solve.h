@@ -77,7 +77,8 @@ class WindowSolve {
   };
   Looks gather(const Known& known);
   void start(const Known& known);
-  void prefer_darker(const Looks& looks);
+  void take_unit_of(const GridFrames& earlier, GridFrames* here);
+  void prefer_darker(const Looks& looks, const GridPictures& chosen);
   void fill_ends(int snapshot, uint8_t* bits) const;
   void take_background(const Looks& looks, const EarlierWindow& earlier);
   void recall_spread(const EarlierWindow& earlier, std::vector<uint8_t>* spread) const;

@@ -37,6 +37,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   WindowLight light = light_of(frames, m, context_.room.pool, &here);
   gains_ = std::move(light.gains);
   clips_ = light.clips;
+  if (clips_ && known.earlier->known()) take_unit_of(known.earlier->cells(), &here);
 
   const int of_window = std::min(m, context_.parameters.start_frames);
   looks.count = of_window + old;
@@ -74,6 +75,28 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   looks.recollection.older_frames = old;
   if (known.history->young()) looks.recollection.share.clear();
   return looks;
+}
+
+// Where samples are at the end of their range, a darker picture of earlier windows knows more: unit
+// light becomes its light, and `here` is what it shows where these frames say only "at least".
+void WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
+  const size_t cells = context_.grid.cells();
+  LightScratch scratch(cells);
+  const Gain gain = light_over(earlier, 0, *here, 0, &scratch);
+  const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
+    for (Gain& of_frame : gains_) of_frame[c] /= unit;
+    float darkest = gains_[0][c];
+    for (const Gain& of_frame : gains_) darkest = std::min(darkest, of_frame[c]);
+    float* const levels = here->plane(0, static_cast<int>(c));
+    const float* const known = earlier.plane(0, static_cast<int>(c));
+    for (size_t cell = 0; cell < cells; ++cell) {
+      levels[cell] *= unit;
+      const bool at_end = levels[cell] * darkest >= steps::light::kNearEnd;
+      if (at_end) levels[cell] = std::max(levels[cell], known[cell] * unit / gain[c]);
+    }
+  }
 }
 
 // The background picture of the stable frames, its thresholds, and the light of each frame.
@@ -117,30 +140,49 @@ void WindowSolve::start(const Known& known) {
     return;
   }
   start_frames_ = looks.count;
-  if (clips_) prefer_darker(looks);
+  if (clips_) prefer_darker(looks, chosen);
   take_background(looks, *known.earlier);
 }
 
-// Frames in which a cell's samples may be at the end of their range say nothing of its background,
-// unless there are few others: then the darkest do.
-void WindowSolve::prefer_darker(const Looks& looks) {
-  std::vector<std::pair<float, uint16_t>> order;
+// Frames in which a cell's samples may be at the end of their range say nothing of its background.
+// Where all that show it are such, darker ones that show what `median` does say it; else the
+// darkest do. chosen: the looks in unit light.
+void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) {
+  const GridFrames& median = looks.median;
+  std::vector<std::pair<float, uint16_t>> shown, darker;
   std::vector<uint8_t> keeps(looks.pictures.size());
+  const auto brightness = [&](size_t frame, size_t cell) {
+    float most = 0;
+    for (int c = 0; c < kChannels; ++c)
+      most = std::max(most, median.plane(0, c)[cell] *
+                                looks.pictures[frame].gain[static_cast<size_t>(c)]);
+    return most;
+  };
+  const auto is_near = [&](int frame, size_t cell) {
+    float apart = 0;
+    for (int c = 0; c < kChannels; ++c)
+      apart += std::abs(chosen.plane(frame, c)[cell] - median.plane(0, c)[cell]);
+    return apart < kChannels * steps::light::kNearMedian;
+  };
   for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
-    order.clear();
+    shown.clear();
+    for (const uint16_t frame : stable_.of_cell[cell])
+      shown.emplace_back(brightness(frame, cell), frame);
+    std::sort(shown.begin(), shown.end());
     std::fill(keeps.begin(), keeps.end(), uint8_t{0});
-    for (const uint16_t frame : stable_.of_cell[cell]) {
-      const Gain& gain = looks.pictures[frame].gain;
-      float brightest = 0;
-      for (int c = 0; c < kChannels; ++c)
-        brightest =
-            std::max(brightest, looks.median.plane(0, c)[cell] * gain[static_cast<size_t>(c)]);
-      order.emplace_back(brightest, frame);
+    if (shown.empty() || shown.back().first < steps::light::kNearEnd) continue;
+    if (shown.front().first >= steps::light::kNearEnd) {
+      darker.clear();
+      for (size_t frame = 0; frame < keeps.size(); ++frame)
+        if (brightness(frame, cell) < shown.front().first && is_near(static_cast<int>(frame), cell))
+          darker.emplace_back(brightness(frame, cell), static_cast<uint16_t>(frame));
+      std::sort(darker.begin(), darker.end());
+      if (!darker.empty()) shown.swap(darker);
     }
-    std::sort(order.begin(), order.end());
-    const size_t least = most_darkest(order.size());
-    for (size_t i = 0; i < order.size(); ++i)
-      keeps[order[i].second] = i < least || order[i].first < steps::light::kNearEnd;
+    const bool any = shown.front().first < steps::light::kNearEnd;
+    const size_t darkest = most_darkest(shown.size());
+    for (size_t i = 0; i < shown.size(); ++i)
+      keeps[shown[i].second] = any ? shown[i].first < steps::light::kNearEnd : i < darkest;
     stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
   }
 }
