@@ -27,6 +27,8 @@ struct SolveFacts {
   int iterations = 1;
   // The model was not finite: the mean of the window's frames is in its place.
   bool replaced = false;
+  // A camera that starts has found its exposure, as far as the learner looks at that.
+  bool settled = true;
   // Seconds in the Gram matrix since the solve before, and in the solve.
   double gram_time = 0, solve_time = 0;
 };

@@ -41,6 +41,7 @@ void FrameFollower::forget() {
   memory_.forget();
   absorbed_.forget();
   scene_.forget();
+  exposure_.forget();
   other_scene_ = scene_begins_ = false;
   calm_ = 0;
 }

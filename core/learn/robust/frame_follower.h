@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/learn/robust/exposure_watch.h"
 #include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/light.h"
@@ -35,6 +36,10 @@ class FrameFollower {
   void read(const LearntEarlier& from);
   // The background in use is this picture now.
   void follow(const std::vector<uint8_t> level[kChannels]);
+  // While a camera that starts looks for its exposure, nothing that it shows is known for sure.
+  bool settled() const { return exposure_.settled(); }
+  // True once, when that is over.
+  bool has_found_exposure() { return exposure_.has_found(); }
   // Solves are told what is known.
   void tell(SolveHistory* history) { history->take(&absorbed_, &memory_); }
   // Learner::enough().
@@ -96,6 +101,7 @@ class FrameFollower {
   HistoryStarts absorbed_;
   int64_t absorb_frames_ = 0;
   SceneWatch scene_;
+  ExposureWatch exposure_;
   // Solves in a row that changed little, since a cell was mended.
   int calm_ = 0;
   // Another scene was seen; and solves know of it, but no background yet.

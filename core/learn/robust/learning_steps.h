@@ -59,6 +59,16 @@ QDMD_STEP float kBin = step("light.bin", 0.02f), kNear = step("light.near", 0.05
 QDMD_STEP size_t kLeastRatios = step("light.least_ratios", size_t{16});
 }  // namespace light
 
+// ---- The exposure of a camera that starts ----
+namespace exposure {
+// It has settled once the mean of frames stays within this share for so many of them, and is no
+// darker than so many levels; or after so many frames.
+constexpr int kFrames = 10;
+QDMD_STEP double kRests = step("exposure.rests", 0.03);
+QDMD_STEP double kDark = step("exposure.dark", 12.0);
+QDMD_STEP int kLongest = step("exposure.longest", 375);
+}  // namespace exposure
+
 // ---- Contours: two looks of a region are told apart by the edges around it ----
 namespace contours {
 // Cells: smaller regions say nothing.

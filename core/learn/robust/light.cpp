@@ -143,6 +143,11 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
       gain_over({frames, frame}, {background, reference}, frames.cells(), scratch, kBin));
 }
 
+bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
+  return brightness(gain) > kSwings &&
+         share_at_end(CellPlanes(frames, frame).of, frames.cells()) > kEnds;
+}
+
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after) {
   if (std::abs(std::log(brightness(after) / brightness(before))) < kStill) {

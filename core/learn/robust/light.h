@@ -57,6 +57,9 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after);
 
+// True where a frame is brighter than unit light, and samples are at the end of their range.
+bool at_end(const GridFrames& frames, int frame, const Gain& gain);
+
 // How many of so many frames are the darkest ones, which say what is behind samples at the end of
 // their range.
 inline size_t most_darkest(size_t frames) {

@@ -138,6 +138,8 @@ void RobustLearner::set_sample_step(int step) {
 
 void RobustLearner::decompose(const SnapshotRange& snapshots) {
   window_ = snapshots;
+  if (follower_.has_found_exposure()) memory_.begin_from_here();
+  settled_ = follower_.settled();
   memory_.see(snapshots);
   follower_.tell(&history_);
 }
@@ -161,6 +163,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
     memory_.take(solve_, *cells, next, history_.held());
     solve_.write_limits(model->make_limits());
   }
+  facts_.settled = settled_;
   facts_.window_frames = window_->size();
   facts_.sample_step = context_.step;
   facts_.iterations = context_.options.iterations;

@@ -73,6 +73,7 @@ class RobustLearner : public Learner {
   FrameFollower follower_;
   // Of the newest solve.
   std::optional<SnapshotRange> window_;
+  bool settled_ = false;
   SolveFacts facts_;
 };
 

@@ -20,6 +20,8 @@ class StreamMemory {
   // What was known of the scene is kept for its return. returns: the scene that was left last is
   // back, and what was known of it is known again.
   void begin_scene(bool returns);
+  // Nothing that frames have shown until now is remembered.
+  void begin_from_here();
   // The window of the next solve: the newest frames.
   void see(const SnapshotRange& window);
   // The number of its first frame, counted like FrameStore::frames_taken().

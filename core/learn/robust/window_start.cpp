@@ -52,6 +52,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
                            memory.shape()};
     });
     for (int k = 0; k < old; ++k) {
+      clips_ |= at_end(memory.cells(), memory.slot(k), looks.pictures[static_cast<size_t>(k)].gain);
       looks.cells.push_back(memory.cells().plane(memory.slot(k), 0));
       looks.numbers.push_back(memory.number(k));
     }
