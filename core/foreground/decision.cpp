@@ -213,8 +213,9 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
   now_.whole = frame.model->depth() > 8 && !now_.means;
-  // Noise is as much brighter as the light is.
-  now_.light = frame.fixed ? 1 : std::max(1.0f, (light[0] + light[1] + light[2]) / kChannels);
+  // Noise is as much brighter as the light is; a little more is within the limits.
+  now_.light =
+      frame.fixed ? 1 : std::max(1.0f, 0.8f * (light[0] + light[1] + light[2]) / kChannels);
   now_.threshold *= now_.light;
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
   now_.level_known =

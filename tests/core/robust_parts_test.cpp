@@ -285,7 +285,8 @@ TEST(LightOf, SmallChangesAreNoise) {
   std::normal_distribution<float> flicker(0, 0.01f);
   std::vector<Gain> truth(30);
   for (Gain& gain : truth) gain.fill(1 + flicker(rng));
-  for (const Gain& gain : light_of(lit_frames(grid, truth, 6, 13), 30).gains) EXPECT_FALSE(is_lit(gain));
+  for (const Gain& gain : light_of(lit_frames(grid, truth, 6, 13), 30).gains)
+    EXPECT_FALSE(is_lit(gain));
 }
 
 TEST(LightOf, WhatMovesIsNoLight) {

@@ -78,10 +78,11 @@ FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light)
   const Cells shown(context_.room.frames->cells(), slot);
   if (!is_lit(light)) return shown;
   const Cells background = this->background();
-  for (size_t c = 0; c < kChannels; ++c)
-    for (size_t cell = 0; cell < context_.grid.cells(); ++cell)
-      unclipped_.plane(0, static_cast<int>(c))[cell] =
-          unclipped(shown.of[c][cell], background.of[c][cell], light[c]);
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
+    const auto found = unclipped(shown.at(cell), background.at(cell), light);
+    for (size_t c = 0; c < kChannels; ++c)
+      unclipped_.plane(0, static_cast<int>(c))[cell] = found[c];
+  }
   return {unclipped_, 0};
 }
 

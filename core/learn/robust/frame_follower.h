@@ -75,6 +75,9 @@ class FrameFollower {
     Cells(const GridFrames& cells, int at)
         : of{cells.plane(at, 0), cells.plane(at, 1), cells.plane(at, 2)} {}
     operator const float* const*() const { return of; }
+    std::array<float, kChannels> at(size_t cell) const {
+      return {of[0][cell], of[1][cell], of[2][cell]};
+    }
   };
   Cells background() const { return {background_cells_, published_}; }
   Cells unclipped_cells(int slot, const Gain& light);

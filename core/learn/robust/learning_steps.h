@@ -35,6 +35,8 @@ QDMD_STEP float kMeasured = step("light.measured", 240.0f);
 // share of the usual light.
 QDMD_STEP float kSwings = step("light.swings", 1.08f), kDarker = step("light.darker", 0.1f);
 QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
+// Levels: a channel that is further from the background says that something else is there.
+QDMD_STEP float kOther = step("light.other", 20.0f);
 // Levels: a darker frame that is so near to the darkest ones' median, a channel's mean, shows the
 // same.
 QDMD_STEP float kNearMedian = step("light.near_median", 8.0f);

@@ -169,9 +169,8 @@ namespace {
 std::vector<size_t> darkest(const std::vector<Gain>& gains) {
   std::vector<size_t> found(gains.size());
   std::iota(found.begin(), found.end(), size_t{0});
-  std::stable_sort(found.begin(), found.end(), [&](size_t a, size_t b) {
-    return brightness(gains[a]) < brightness(gains[b]);
-  });
+  std::stable_sort(found.begin(), found.end(),
+                   [&](size_t a, size_t b) { return brightness(gains[a]) < brightness(gains[b]); });
   found.resize(most_darkest(found.size()));
   std::sort(found.begin(), found.end());
   return found;

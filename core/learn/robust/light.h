@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -66,14 +68,38 @@ inline size_t most_darkest(size_t frames) {
   return std::min(frames, std::max(steps::light::kLeastDark, frames / steps::light::kDarkOf));
 }
 
-// What a cell shows in a frame with this gain, where `background` is what is behind it in unit
-// light: `level`, or, where samples at the end of their range say no more than that it is brighter
-// (darker) than they are, the background in that light.
-inline float unclipped(float level, float background, float gain) {
+// True where a channel that shows `level` says no more than that it is brighter (darker) than that,
+// and than `expected`, what `background` would show in a frame with this gain.
+inline bool is_bound(float level, float expected, float background, float gain) {
   using namespace steps::light;
-  const float expected = background * gain;
-  if (level >= kNearEnd && expected > level) return expected;
-  return background >= kAtEnd && gain < 1 && level > expected ? expected : level;
+  return (level >= kNearEnd && expected > level) ||
+         (background >= kAtEnd && gain < 1 && level > expected);
+}
+
+// True where a cell that shows `level` in a frame with this gain may show `background`, which is in
+// unit light: samples at the end of their range are bounds.
+inline bool may_show(const std::array<float, kChannels>& level,
+                     const std::array<float, kChannels>& background, const Gain& gain) {
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float expected = background[c] * gain[c];
+    if (is_bound(level[c], expected, background[c], gain[c])) continue;
+    if (std::abs(level[c] - expected) > steps::light::kOther * std::max(1.0f, gain[c]))
+      return false;
+  }
+  return true;
+}
+
+// `level`; where it may show `background`, and samples hide that, the background in that light.
+inline std::array<float, kChannels> unclipped(const std::array<float, kChannels>& level,
+                                              const std::array<float, kChannels>& background,
+                                              const Gain& gain) {
+  if (!may_show(level, background, gain)) return level;
+  std::array<float, kChannels> found = level;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float expected = background[c] * gain[c];
+    if (is_bound(level[c], expected, background[c], gain[c])) found[c] = expected;
+  }
+  return found;
 }
 
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become

@@ -78,6 +78,7 @@ class WindowSolve {
   Looks gather(const Known& known);
   void start(const Known& known);
   void take_unit_of(const GridFrames& earlier, GridFrames* here);
+  void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
   void prefer_darker(const Looks& looks, const GridPictures& chosen);
   void fill_ends(int snapshot, uint8_t* bits) const;
   void take_background(const Looks& looks, const EarlierWindow& earlier);

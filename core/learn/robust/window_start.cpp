@@ -122,11 +122,8 @@ void WindowSolve::start(const Known& known) {
       const float* const channel = looks.cells[i] + c * cells;
       std::transform(channel, channel + cells, to + c * cells,
                      [inverse](float level) { return level * inverse; });
-      if (!clips_) continue;
-      const float* const behind = looks.median.plane(0, static_cast<int>(c));
-      for (size_t cell = 0; cell < cells; ++cell)
-        to[c * cells + cell] = unclipped(channel[cell], behind[cell], gain[c]) * inverse;
     }
+    if (clips_) unclip(looks.cells[i], looks.median, gain, to);
     chosen.add(to);
   }
   const bool recalls = known.earlier->known();
@@ -145,45 +142,77 @@ void WindowSolve::start(const Known& known) {
   take_background(looks, *known.earlier);
 }
 
+// Writes a frame's cells in unit light, as far as `median` says what clipped samples hide.
+void WindowSolve::unclip(const float* shown, const GridFrames& median, const Gain& gain,
+                         float* out) const {
+  const size_t cells = context_.grid.cells();
+  for (size_t cell = 0; cell < cells; ++cell) {
+    const auto found = unclipped(
+        {shown[cell], shown[cells + cell], shown[2 * cells + cell]},
+        {median.plane(0, 0)[cell], median.plane(0, 1)[cell], median.plane(0, 2)[cell]}, gain);
+    for (size_t c = 0; c < kChannels; ++c) out[c * cells + cell] = found[c] / gain[c];
+  }
+}
+
 // Frames in which a cell's samples may be at the end of their range say nothing of its background.
-// Where all that show it are such, darker ones that show what `median` does say it; else the
-// darkest do. chosen: the looks in unit light.
+// Where all that show it are such, darker ones that may show the same say it; else the darkest do.
+// chosen: the looks in unit light.
 void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) {
-  const GridFrames& median = looks.median;
+  using steps::light::kNearEnd;
+  const size_t cells = context_.grid.cells();
   std::vector<std::pair<float, uint16_t>> shown, darker;
   std::vector<uint8_t> keeps(looks.pictures.size());
-  const auto brightness = [&](size_t frame, size_t cell) {
-    float most = 0;
+  const auto level = [&](size_t frame, size_t cell) -> std::array<float, kChannels> {
+    const float* const of = looks.cells[frame];
+    return {of[cell], of[cells + cell], of[2 * cells + cell]};
+  };
+  // What most dark frames show.
+  const auto shows_median = [&](size_t frame, size_t cell) {
+    float apart = 0;
     for (int c = 0; c < kChannels; ++c)
-      most = std::max(most, median.plane(0, c)[cell] *
+      apart +=
+          std::abs(chosen.plane(static_cast<int>(frame), c)[cell] - looks.median.plane(0, c)[cell]);
+    return apart < kChannels * steps::light::kNearMedian;
+  };
+  // With what is cut off.
+  const auto brightest = [&](size_t frame, size_t cell) {
+    const auto of = level(frame, cell);
+    float most = std::max({of[0], of[1], of[2]});
+    if (!shows_median(frame, cell)) return most;
+    for (int c = 0; c < kChannels; ++c)
+      most = std::max(most, looks.median.plane(0, c)[cell] *
                                 looks.pictures[frame].gain[static_cast<size_t>(c)]);
     return most;
   };
-  const auto is_near = [&](int frame, size_t cell) {
-    float apart = 0;
-    for (int c = 0; c < kChannels; ++c)
-      apart += std::abs(chosen.plane(frame, c)[cell] - median.plane(0, c)[cell]);
-    return apart < kChannels * steps::light::kNearMedian;
+  // What frame `dark` shows could be what frame `bright` does, too.
+  const auto explains = [&](size_t dark, size_t bright, size_t cell) {
+    const int at = static_cast<int>(dark);
+    return shows_median(dark, cell) &&
+           may_show(
+               level(bright, cell),
+               {chosen.plane(at, 0)[cell], chosen.plane(at, 1)[cell], chosen.plane(at, 2)[cell]},
+               looks.pictures[bright].gain);
   };
   for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
     shown.clear();
     for (const uint16_t frame : stable_.of_cell[cell])
-      shown.emplace_back(brightness(frame, cell), frame);
+      shown.emplace_back(brightest(frame, cell), frame);
     std::sort(shown.begin(), shown.end());
     std::fill(keeps.begin(), keeps.end(), uint8_t{0});
-    if (shown.empty() || shown.back().first < steps::light::kNearEnd) continue;
-    if (shown.front().first >= steps::light::kNearEnd) {
+    if (shown.empty() || shown.back().first < kNearEnd) continue;
+    if (shown.front().first >= kNearEnd) {
       darker.clear();
       for (size_t frame = 0; frame < keeps.size(); ++frame)
-        if (brightness(frame, cell) < shown.front().first && is_near(static_cast<int>(frame), cell))
-          darker.emplace_back(brightness(frame, cell), static_cast<uint16_t>(frame));
+        if (brightest(frame, cell) < shown.front().first &&
+            explains(frame, shown.front().second, cell))
+          darker.emplace_back(brightest(frame, cell), static_cast<uint16_t>(frame));
       std::sort(darker.begin(), darker.end());
       if (!darker.empty()) shown.swap(darker);
     }
-    const bool any = shown.front().first < steps::light::kNearEnd;
+    const bool any = shown.front().first < kNearEnd;
     const size_t darkest = most_darkest(shown.size());
     for (size_t i = 0; i < shown.size(); ++i)
-      keeps[shown[i].second] = any ? shown[i].first < steps::light::kNearEnd : i < darkest;
+      keeps[shown[i].second] = any ? shown[i].first < kNearEnd : i < darkest;
     stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
   }
 }
