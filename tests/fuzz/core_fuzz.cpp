@@ -373,7 +373,7 @@ void try_library(fuzz::Bytes* bytes) {
   options.method = static_cast<library::Method>(bytes->below(3));
   options.window_size = sane ? bytes->from(2, 6) : bytes->any_int();
   options.hop_size = sane ? bytes->below(3) : bytes->any_int();
-  options.stabilize = bytes->once_in(2);
+  options.stabilize = static_cast<library::Stabilize>(bytes->below(3));
   options.foreground_threshold = sane ? bytes->byte() : bytes->any_double();
   options.absorb_frames = sane ? bytes->byte() : bytes->any_int();
   options.threads = sane ? 1 : std::min(bytes->any_int(), 3);
@@ -382,7 +382,8 @@ void try_library(fuzz::Bytes* bytes) {
     // Few are enough, and an eighth of the inputs may not take most of the time.
     int left = 16;
     for (int t = 0; left > 0 && !bytes->empty(); ++t) {
-      library::Layout layout{bytes->from(1, 8), bytes->from(1, 8), 0, bytes->once_in(2)};
+      library::Layout layout{bytes->from(1, 8), bytes->from(1, 8), 0,
+                             bytes->once_in(2) ? library::Pixels::bgr : library::Pixels::rgb};
       if (bytes->once_in(12)) layout.width = -bytes->below(3);
       const int padding = bytes->below(5);
       layout.row_bytes = 3 * std::max(layout.width, 0) + padding;
