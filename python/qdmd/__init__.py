@@ -116,12 +116,13 @@ class Separator:
         """Frames that go in before the first one comes out: 0 in mode='live', else window_size - 1."""
         return self._delay
 
-    def apply(self, frame: Frame) -> npt.NDArray[np.uint8]:
+    def apply(self, frame: Frame, mask: Optional[npt.NDArray[np.uint8]] = None) -> npt.NDArray[np.uint8]:
         """Learns from a frame and returns its mask, (height, width) of uint8: 255 where something is not background.
 
-        mode='live' only. The first mask is empty, since nothing is known yet.
+        mask: an array in which to write it, which saves the time for a new one. mode='live' only. The first mask is
+        empty, since nothing is known yet.
         """
-        return self._native.apply(frame)
+        return self._native.apply(frame, mask)
 
     def background(self) -> Optional[Frame]:
         """The newest background, with the frames' shape and type; None where nothing is known yet."""

@@ -82,6 +82,23 @@ Picture new_picture(const Layout& frames, Pixels pixels, int channels) {
   return picture;
 }
 
+Picture new_mask(Layout frames) {
+  frames.depth = 8;
+  return new_picture(frames, Pixels::grey, 0);
+}
+
+// The caller's memory for a mask of such frames.
+Picture mask_in(const py::object& object, const Layout& frames) {
+  if (!py::isinstance<py::array_t<uint8_t>>(object))
+    throw py::type_error("mask is a numpy array of uint8");
+  auto array = py::reinterpret_borrow<py::array>(object);
+  if (array.ndim() != 2 || array.shape(0) != frames.height || array.shape(1) != frames.width)
+    throw py::value_error("mask has the shape (height, width) of the frame");
+  if (!array.writeable() || array.strides(1) != 1 || array.strides(0) < array.shape(1))
+    throw py::value_error("mask can be written to, and pixels of a row lie side by side");
+  return {array, {frames.width, frames.height, array.strides(0), Pixels::grey, 8}};
+}
+
 Output output_of(const std::string& name) {
   if (name == "background") return Output::background;
   if (name == "foreground") return Output::foreground;
@@ -111,16 +128,15 @@ class NativeSeparator : Alone {
     if (depth < 9 || depth > 16) throw py::value_error("depth must be 9 to 16 bits");
   }
 
-  py::array apply(const py::object& frame) {
+  py::array apply(const py::object& frame, const py::object& into) {
     const Picture picture = picture_of(frame, depth_, blue_first_);
-    Layout of_mask = picture.layout;
-    of_mask.depth = 8;
-    Picture mask = new_picture(of_mask, Pixels::grey, 0);
-    auto* const to = static_cast<uint8_t*>(mask.array.mutable_data());
+    const Picture mask = into.is_none() ? new_mask(picture.layout) : mask_in(into, picture.layout);
+    py::array array = mask.array;
+    auto* const to = static_cast<uint8_t*>(array.mutable_data());
     alone(
         [&] { separator_.apply(picture.array.data(), picture.layout, to, mask.layout.row_bytes); });
     channels_ = shape_of(picture);
-    return mask.array;
+    return array;
   }
   void push(const py::object& frame) {
     const Picture picture = picture_of(frame, depth_, blue_first_);
@@ -132,10 +148,8 @@ class NativeSeparator : Alone {
   }
   py::array picture(const std::string& name) {
     const Output output = output_of(name);
-    Layout frames = alone([&] { return separator_.frames(); });
-    if (output == Output::mask) frames.depth = 8;
-    Picture out =
-        output == Output::mask ? new_picture(frames, Pixels::grey, 0) : like_frames(frames);
+    const Layout frames = alone([&] { return separator_.frames(); });
+    Picture out = output == Output::mask ? new_mask(frames) : like_frames(frames);
     void* const to = out.array.mutable_data();
     alone([&] { separator_.write(output, out.layout, to); });
     return out.array;
@@ -368,7 +382,7 @@ PYBIND11_MODULE(_native, module) {
              return std::make_unique<NativeSeparator>(options_of(settings), depth, bgr);
            }),
            py::arg("settings"), py::arg("depth"), py::arg("bgr"))
-      .def("apply", &NativeSeparator::apply, py::arg("frame"))
+      .def("apply", &NativeSeparator::apply, py::arg("frame"), py::arg("mask"))
       .def("push", &NativeSeparator::push, py::arg("frame"))
       .def("ready", &NativeSeparator::ready)
       .def("picture", &NativeSeparator::picture, py::arg("output"))

@@ -92,6 +92,23 @@ def test_frames_are_not_changed_and_may_be_read_only():
         assert (frame == before).all()
 
 
+def test_masks_are_written_where_they_are_wanted():
+    plain, separator = qdmd.Separator(), qdmd.Separator()
+    room = np.full((HEIGHT + 2, WIDTH + 3), 77, np.uint8)
+    inside = room[1:-1, 2:-1]
+    for frame in street(20):
+        assert separator.apply(frame, inside) is inside
+        assert (inside == plain.apply(frame)).all()
+    assert inside.any() and (room[0] == 77).all() and (room[:, :2] == 77).all() and (room[:, -1] == 77).all()
+    for wrong, error in ((room, ValueError), (room[1:-1, ::2], ValueError), (inside[..., None], ValueError),
+                         (np.zeros((HEIGHT, WIDTH)), TypeError), (np.zeros((HEIGHT, 2 * WIDTH), np.uint8)[:, ::2], ValueError)):
+        with pytest.raises(error):
+            separator.apply(frame, wrong)
+    inside.flags.writeable = False
+    with pytest.raises(ValueError):
+        separator.apply(frame, inside)
+
+
 def test_bgr_is_rgb_turned_round():
     rgb, bgr = qdmd.Separator(), qdmd.Separator(bgr=True)
     for frame in street(30):
