@@ -16,7 +16,7 @@ test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-b
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x gstreamer1.0-opencv openmpi-bin
-  libopenmpi-dev pybind11-dev python3-dev python3-pytest)
+  libopenmpi-dev pybind11-dev python3-dev python3-pytest appstream)
 # The module qdmd for Python.
 python=(pybind11-dev python3-dev python3-numpy)
 # What gst/debian/control asks for beyond build; tests make a package, too.
