@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Pushes frames that a program has as numpy arrays, and takes their masks as numpy arrays.
 
 Needs python3-gi, python3-numpy and gir1.2-gst-plugins-base-1.0, and GST_PLUGIN_PATH where the plugin is not installed.

@@ -167,7 +167,7 @@ def messages_as_documented(folder):
         'qdmdscenesrc num-buffers=30 ! qdmdbackground window-size=10 post-messages=true ! fakesink')
     pipeline.set_state(common.Gst.State.PLAYING)
     names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double',
-             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum'}
+             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum', 'GstQdmdBackgroundEstimator': 'enum'}
     try:
         for _ in range(3):
             message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Compiles the adapter against OpenCV's interface as it is since 2026, in which cv::BackgroundSubtractor asks for a
 # second apply(), with a known foreground: newest_opencv.sh INCLUDE_FOLDER, where OpenCV's headers of this machine are.
 set -euo pipefail
