@@ -95,8 +95,8 @@ int channels_of(Pixels pixels) {
   throw std::invalid_argument("pixels is none of grey, rgb, bgr, rgba and bgra");
 }
 
-void check_rows(int height, ptrdiff_t row_bytes, int64_t needed) {
-  if (height > 1 && std::abs(int64_t{row_bytes}) < needed)
+void check_rows(ptrdiff_t row_bytes, int64_t needed) {
+  if (std::abs(int64_t{row_bytes}) < needed)
     throw std::invalid_argument("row_bytes is " + std::to_string(row_bytes) +
                                 " and a row has pixels of " + std::to_string(needed) +
                                 " bytes: give the distance from one row to the next");
@@ -108,7 +108,7 @@ void check_layout(const void* samples, const Layout& layout) {
     throw std::invalid_argument("a frame needs at least one pixel");
   if (layout.depth < 8 || layout.depth > 16)
     throw std::invalid_argument("depth must be 8 to 16 bits");
-  check_rows(layout.height, layout.row_bytes,
+  check_rows(layout.row_bytes,
              int64_t{layout.width} * channels_of(layout.pixels) * (layout.depth > 8 ? 2 : 1));
 }
 

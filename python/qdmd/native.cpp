@@ -60,7 +60,7 @@ Picture picture_of(const py::object& object, int depth, bool blue_first) {
   if (!array) throw py::error_already_set();
   Picture picture;
   picture.layout = {static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
-                    array.strides(0),
+                    array.shape(0) == 1 ? array.shape(1) * pixel : array.strides(0),
                     channels == 1   ? Pixels::grey
                     : channels == 3 ? (blue_first ? Pixels::bgr : Pixels::rgb)
                                     : (blue_first ? Pixels::bgra : Pixels::rgba),
@@ -94,9 +94,10 @@ Picture mask_in(const py::object& object, const Layout& frames) {
   auto array = py::reinterpret_borrow<py::array>(object);
   if (array.ndim() != 2 || array.shape(0) != frames.height || array.shape(1) != frames.width)
     throw py::value_error("mask has the shape (height, width) of the frame");
-  if (!array.writeable() || array.strides(1) != 1 || array.strides(0) < array.shape(1))
+  const py::ssize_t row = array.shape(0) == 1 ? array.shape(1) : array.strides(0);
+  if (!array.writeable() || (array.strides(1) != 1 && array.shape(1) > 1) || row < array.shape(1))
     throw py::value_error("mask can be written to, and pixels of a row lie side by side");
-  return {array, {frames.width, frames.height, array.strides(0), Pixels::grey, 8}};
+  return {array, {frames.width, frames.height, row, Pixels::grey, 8}};
 }
 
 Output output_of(const std::string& name) {

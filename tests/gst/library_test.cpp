@@ -531,8 +531,9 @@ TEST(Separator, RefusesLayoutsThatHoldNoPicture) {
   // Bottom up: the first row is the last one in memory.
   separator.apply(picture.data() + 5 * 24, with([](Layout& l) { l.row_bytes = -24; }),
                   mask.data() + 5 * 8, -8);
-  // One row has no distance to a next one.
-  separator.apply(picture.data(), {8, 1, 0, Pixels::rgb, 8}, mask.data(), 0);
+  // Also where there is no next row.
+  EXPECT_THROW(separator.apply(picture.data(), {8, 1, 23, Pixels::rgb, 8}, mask.data(), 8),
+               std::invalid_argument);
   separator.push(picture.data(), good);
   EXPECT_THROW(separator.push(picture.data(), good), std::invalid_argument);
   EXPECT_THROW(separator.write(Output::background, {8, 6, 8, Pixels::grey, 8}, picture.data()),

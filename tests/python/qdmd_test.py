@@ -83,6 +83,20 @@ def test_views_are_what_their_copies_are():
     assert mask.any()
 
 
+@pytest.mark.parametrize('shape', [(1, 1), (1, 7, 3), (7, 1, 3), (1, 1, 4)])
+def test_pictures_of_one_row_or_column(shape):
+    big = np.zeros(tuple(4 * side for side in shape[:2]) + shape[2:], np.uint8)
+    separator, other = qdmd.Separator(), qdmd.Separator()
+    for t in range(5):
+        big[...] = 10 * t
+        thin = big[:1, :shape[1]] if shape[0] == 1 else big[:shape[0], :1]
+        assert (separator.apply(thin) == other.apply(thin.copy())).all()
+        room = np.ones(thin.shape[:2], np.uint8)
+        assert separator.apply(thin, room) is room
+        other.apply(thin)
+    assert separator.background().shape == shape
+
+
 def test_frames_are_not_changed_and_may_be_read_only():
     separator = qdmd.Separator()
     for frame in street(5):
