@@ -146,6 +146,7 @@ class BackgroundSubtractor : public cv::BackgroundSubtractor {
     see("shadows", &options->shadows);
     see("mask_softness", &options->mask_softness);
     see("absorb_frames", &options->absorb_frames);
+    see("frame_rate", &options->frame_rate);
     see("time_budget", &options->time_budget);
     see("threads", &options->threads);
     see("max_memory", &options->max_memory);

@@ -65,6 +65,8 @@ EngineOptions engine_options(const Options& options, const Kind& kind) {
   result.foreground_threshold = options.foreground_threshold;
   result.shadows = static_cast<qdmd::Shadows>(options.shadows);
   result.mask_softness = options.mask_softness;
+  // The engine's own rate would be for frames that come while a window is solved: here none do.
+  result.steps = at_rate(result.steps, options.frame_rate);
   result.threads = options.threads;
   result.max_memory = options.max_memory;
   result.colours = kind.colours;
@@ -197,6 +199,8 @@ struct Separator::State {
 Separator::Separator(const Options& options) {
   if (options.absorb_frames < 0)
     throw std::invalid_argument("absorb_frames must be 0 (never) or more");
+  if (!(options.frame_rate > 0))
+    throw std::invalid_argument("frame_rate must be above 0 frames per second");
   if (!(options.time_budget >= 0))
     throw std::invalid_argument("time_budget must be 0 (no limit) or more milliseconds");
   check(EnginePlan(engine_options(options, {}), 1, 1).status());

@@ -52,6 +52,7 @@ struct Options {
   int mask_softness = 0;          // pixels over which the edge of a mask fades, up to 15
   std::vector<Rectangle> ignore;  // at most 64: nothing is foreground there
   int absorb_frames = 7500;       // until what came and stands is background; 0: never
+  double frame_rate = 25;         // frames per second; below 5 masks treat them as a time lapse
   double time_budget = 0;         // milliseconds that a frame may take on average; 0: no limit
   int threads = 0;                // up to 256; 0: one for each core. Changes no result
   uint64_t max_memory = uint64_t{4} << 30;  // bytes

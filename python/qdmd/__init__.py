@@ -80,7 +80,7 @@ class Separator:
 
     Three more are not the element's, which knows them from its video:
 
-    frame_rate            frames per second, for absorb_time
+    frame_rate            frames per second, for absorb_time; below 5 masks treat them as a time lapse
     depth                 bits of a sample of uint16, 9 to 16: the lowest ones of each word
     bgr                   channels are B, G, R, as OpenCV has them
 
@@ -104,8 +104,8 @@ class Separator:
             omega_threshold=omega_threshold, amplitude=amplitude, solver=solver, estimator=estimator,
             sample_step=sample_step, iterations=iterations, stabilize=stabilize, stabilize_output=stabilize_output,
             foreground_threshold=foreground_threshold, shadows=shadows, mask_softness=mask_softness,
-            ignore=_rectangles(ignore), absorb_frames=absorb_frames, time_budget=time_budget, n_threads=n_threads,
-            max_memory=max_memory), depth, bgr)
+            ignore=_rectangles(ignore), absorb_frames=absorb_frames, frame_rate=frame_rate,
+            time_budget=time_budget, n_threads=n_threads, max_memory=max_memory), depth, bgr)
         self._delay = window_size - 1 if mode == 'batch' else 0
         self._waiting = 0
         if load_location is not None:
@@ -286,7 +286,7 @@ def decompose(frames: Iterable[Frame], *, rank: int = 0, omega_threshold: float 
         mode='batch', method='qdmd', window_size=100, hop_size=0, rank=rank, omega_threshold=omega_threshold,
         amplitude=amplitude, solver=solver, estimator=estimator, sample_step=0, iterations=1, stabilize='off',
         stabilize_output=False, foreground_threshold=0.0, shadows='background', mask_softness=0, ignore=[],
-        absorb_frames=0, time_budget=0.0, n_threads=n_threads, max_memory=4 << 30)
+        absorb_frames=0, frame_rate=25.0, time_budget=0.0, n_threads=n_threads, max_memory=4 << 30)
     if len(pictures) < 2:
         raise ValueError('give at least two frames')
     found = _native.decompose(pictures, settings, depth)

@@ -256,6 +256,7 @@ Options options_of(const py::dict& settings) {
   set("foreground_threshold", &options.foreground_threshold);
   set("mask_softness", &options.mask_softness);
   set("absorb_frames", &options.absorb_frames);
+  set("frame_rate", &options.frame_rate);
   set("time_budget", &options.time_budget);
   set("n_threads", &options.threads);
   set("max_memory", &options.max_memory);

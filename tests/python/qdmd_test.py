@@ -198,6 +198,24 @@ def test_settings_do_what_the_elements_do():
     assert any((one != other).any() for one, other in zip(plain, masks(method='qdmd')))
 
 
+def test_a_time_lapse_is_told_by_its_rate():
+    def found(frame_rate):
+        separator, random = qdmd.Separator(frame_rate=frame_rate), np.random.default_rng(4)
+        wall = next(street(1)).astype(int)
+        wall[20:32, :12] = wall[32:44, :12]  # without the square
+        share = []
+        for t in range(400):
+            frame = wall + random.integers(-3, 4, wall.shape)
+            left = random.integers(20, 50)
+            frame[20:44, left:left + 8] = (150, 60, 60)
+            mask = separator.apply(frame.astype(np.uint8))
+            if t >= 250:
+                share.append((mask[20:44, left:left + 8] > 0).mean())
+        return np.mean(share)
+
+    assert found(1) > 0.97 and found(25) < found(1) - 0.02
+
+
 def test_ignore_and_freeze_hold_from_the_next_frame():
     separator = qdmd.Separator(window_size=20)
     frames = list(street(60))
@@ -237,7 +255,8 @@ def test_save_and_load(tmp_path):
 
 @pytest.mark.parametrize('settings, word', [
     (dict(window_size=1), 'window-size'), (dict(mode='later'), 'live, batch'), (dict(hop_size=101), 'hop-size'),
-    (dict(absorb_time=-1), 'absorb_time'), (dict(solver='fast'), 'gram-extended'), (dict(mask_softness=16), 'softness'),
+    (dict(absorb_time=-1), 'absorb_time'), (dict(frame_rate=0), 'frame_rate'), (dict(solver='fast'), 'gram-extended'),
+    (dict(mask_softness=16), 'softness'),
     (dict(ignore=[(1, 2, 3)]), 'x, y, width, height'), (dict(ignore=[(1, 2, 0, 3)]), 'ignore'), (dict(depth=8), 'depth'),
     (dict(foreground_threshold=float('nan')), 'threshold'), (dict(time_budget=-1.0), 'time_budget')])
 def test_refused_settings_say_what_to_change(settings, word):
