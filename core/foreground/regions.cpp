@@ -43,6 +43,14 @@ void merge_overlapping(std::vector<Region>* regions) {
   }
 }
 
+// A strip along one edge, less than `reach` wide: the first rows or columns of something that comes
+// in, which has a box with the next frames, or a rim that a camera's movement leaves.
+bool is_strip_at_edge(const Region& r, int width, int height, int reach) {
+  const bool left = r.x == 0, right = r.x + r.width == width;
+  const bool top = r.y == 0, bottom = r.y + r.height == height;
+  return (r.width < reach && left != right) || (r.height < reach && top != bottom);
+}
+
 // The largest first; of equals the one that begins further up, or further to the left.
 bool comes_before(const Region& a, const Region& b) {
   return std::tuple(-a.area, a.y, a.x) < std::tuple(-b.area, b.y, b.x);
@@ -149,6 +157,9 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
   std::sort(regions.begin(), regions.end(), comes_before);
   if (regions.size() > kMostRegions) regions.resize(kMostRegions);
   merge_overlapping(&regions);
+  if (least_area == 0)
+    std::erase_if(regions,
+                  [&](const Region& r) { return is_strip_at_edge(r, width, height, reach); });
   std::sort(regions.begin(), regions.end(), comes_before);
   return regions;
 }
