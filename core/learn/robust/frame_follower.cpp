@@ -42,7 +42,10 @@ void FrameFollower::forget() {
   absorbed_.forget();
   scene_.forget();
   exposure_.forget();
-  other_scene_ = scene_begins_ = false;
+  other_scene_ = scene_begins_ = colours_begin_ = false;
+  other_coloured_ = 0;
+  new_colours_.reset();
+  left_colours_.reset();
   calm_ = 0;
 }
 
@@ -51,6 +54,7 @@ void FrameFollower::publish(bool whole) {
   calm_ = whole && is_calm() ? calm_ + 1 : 0;
   published_ = 1 - published_;
   if (!std::exchange(scene_begins_, false)) return;
+  colours_begin_ = false;
   looks_.forget();
   if (context_.room.models != Models::two_of_live) memory_.forget();
   other_scene_ = false;
@@ -97,10 +101,35 @@ SceneSeen FrameFollower::scene_of(int slot) {
     other_scene_ = false;
     return SceneSeen::the_one_before;
   }
+  if (colours_begin_) return SceneSeen::same;
   const SceneSeen seen = scene_.follow(frame, background);
   other_scene_ = seen != SceneSeen::same;
-  if (other_scene_) scene_.leave();
+  if (!other_scene_) return colours_of(frame);
+  scene_.leave();
+  left_colours_.reset();
   return seen;
+}
+
+// The same contours: a camera switches to infra-red, or back.
+SceneSeen FrameFollower::colours_of(const Cells& frame) {
+  const size_t cells = context_.grid.cells();
+  const Cells background = this->background();
+  const Colours colours = context_.options.colours;
+  const Colouring now = colouring_of(frame, cells, colours),
+                  known = colouring_of(background, cells, colours);
+  const bool other = scene_.shows_background() && now != known && now != Colouring::little &&
+                     known != Colouring::little;
+  other_coloured_ = other ? other_coloured_ + 1 : 0;
+  if (other_coloured_ < steps::colour::kFrames) return SceneSeen::same;
+  const bool returns = left_colours_ == now;
+  // Nobody knows which colours a grey scene has.
+  new_colours_.reset();
+  if (now == Colouring::none) new_colours_ = find_colour_map(frame, background, cells);
+  if (!returns && now == Colouring::none && !new_colours_) return SceneSeen::same;
+  other_coloured_ = 0;
+  colours_begin_ = true;
+  left_colours_ = known;
+  return returns ? SceneSeen::earlier_colours : SceneSeen::other_colours;
 }
 
 void FrameFollower::begin_scene() {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/exposure_watch.h"
 #include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/learning_steps.h"
@@ -51,6 +53,9 @@ class FrameFollower {
   void set_absorb_frames(int64_t frames) { absorb_frames_ = frames; }
   SceneSeen scene_of(int slot);
   void begin_scene();
+  // What makes the background's colours those of the newest frames, after scene_of() said that they
+  // are others; null: nobody knows.
+  const ColourMap* new_colours() const { return new_colours_ ? &*new_colours_ : nullptr; }
   Gain light(int slot) {
     return light_over(context_.room.frames->cells(), slot, background_cells_, published_,
                       &light_scratch_);
@@ -82,6 +87,7 @@ class FrameFollower {
   Cells background() const { return {background_cells_, published_}; }
   Cells unclipped_cells(int slot, const Gain& light);
   bool is_calm() const;
+  SceneSeen colours_of(const Cells& frame);
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
                        const BackgroundModel* of_window);
   void mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
@@ -107,6 +113,12 @@ class FrameFollower {
   ExposureWatch exposure_;
   // Solves in a row that changed little, since a cell was mended.
   int calm_ = 0;
+  // In other colours: frames in a row; until the background in use has them, too; and the colours
+  // that are known to have been left.
+  int other_coloured_ = 0;
+  bool colours_begin_ = false;
+  std::optional<ColourMap> new_colours_;
+  std::optional<Colouring> left_colours_;
   // Another scene was seen; and solves know of it, but no background yet.
   bool other_scene_ = false, scene_begins_ = false;
 };

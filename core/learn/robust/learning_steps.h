@@ -61,6 +61,20 @@ QDMD_STEP float kBin = step("light.bin", 0.02f), kNear = step("light.near", 0.05
 QDMD_STEP size_t kLeastRatios = step("light.least_ratios", size_t{16});
 }  // namespace light
 
+// ---- Other colours: a camera that switches to infra-red ----
+namespace colour {
+// A picture has no colour where the mean distance of its channels is less than this share of its
+// level, and some where it is more than the second.
+QDMD_STEP double kNone = step("colour.none", 0.025), kSome = step("colour.some", 0.07);
+// A linear map explains the change where this share of the cells is within so many levels of it, a
+// channel's mean. It is fitted so often, to those of the time before.
+QDMD_STEP double kFits = step("colour.fits", 0.7);
+QDMD_STEP float kExplained = step("colour.explained", 10.0f);
+QDMD_STEP int kRounds = step("colour.rounds", 4);
+// Frames in a row that are in other colours.
+QDMD_STEP int kFrames = step("colour.frames", 1);
+}  // namespace colour
+
 // ---- The exposure of a camera that starts ----
 namespace exposure {
 // It has settled once the mean of frames stays within this share for so many of them, and is no

@@ -113,7 +113,14 @@ void RobustLearner::publish() {
 
 void RobustLearner::begin_scene(bool returns) {
   memory_.begin_scene(returns);
+  if (const ColourMap* map = follower_.new_colours(); map && !returns) memory_.recolour(*map);
   follower_.begin_scene();
+}
+
+bool RobustLearner::recolour(Learnt* learnt) const {
+  const ColourMap* const map = follower_.new_colours();
+  if (map) qdmd::recolour(*map, learnt);
+  return map != nullptr;
 }
 
 void RobustLearner::remember(Learnt* learnt) const {

@@ -60,6 +60,7 @@ class RobustLearner : public Learner {
 
   SceneSeen scene_of(int slot) override { return follower_.scene_of(slot); }
   void begin_scene(bool returns) override;
+  bool recolour(Learnt* learnt) const override;
 
   bool follows_light() const override { return true; }
   void follow(const std::vector<uint8_t> level[kChannels]) override { follower_.follow(level); }

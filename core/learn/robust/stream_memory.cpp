@@ -36,6 +36,12 @@ void StreamMemory::begin_scene(bool returns) {
   stream_from_ = -1;
 }
 
+void StreamMemory::recolour(const ColourMap& map) {
+  if (!left_.known()) return;
+  earlier_ = left_;
+  earlier_.recolour(context_.grid, map);
+}
+
 void StreamMemory::begin_from_here() {
   earlier_.forget();
   frames_.forget();
