@@ -148,6 +148,13 @@ static News publish(State& state, guint64 frames_in, guint64 frames_out, GstBuff
 // Says what new solves found.
 static void tell_of_solves(State& state, const News& news) {
   if (news.solves == 0) return;
+  const bool settled = news.engine.solve.settled;
+  if (settled && !state.told_ready)
+    gst_element_post_message(
+        state.element,
+        gst_message_new_element(GST_OBJECT(state.element),
+                                make_ready_message(*state.segment, news.time.timestamp)));
+  state.told_ready = settled;
   GST_OBJECT_LOCK(state.element);
   const bool post = state.settings.post_messages;
   const Counters counters = state.counters;
@@ -391,6 +398,7 @@ bool configure(State& state, const Settings& settings, const GstVideoInfo& info,
   forget_frames(state);
   state.info = info;
   state.solves_told = 0;
+  state.told_ready = false;
   state.ignored_seen = 0;
   EngineOptions options = settings.engine;
   // The first window teaches masks before a frame says what is wished of its pictures.

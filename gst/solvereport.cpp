@@ -111,6 +111,13 @@ GstStructure* make_scene_message(const GstSegment& segment, GstClockTime timesta
                            gboolean(camera_moved), nullptr);
 }
 
+GstStructure* make_ready_message(const GstSegment& segment, GstClockTime timestamp) {
+  const FrameTimes times(segment, timestamp);
+  return gst_structure_new("qdmdbackground-ready", "timestamp", G_TYPE_UINT64, guint64(timestamp),
+                           "stream-time", G_TYPE_UINT64, times.stream, "running-time",
+                           G_TYPE_UINT64, times.running, nullptr);
+}
+
 GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,
                                  const GstSegment& segment, GstClockTime timestamp,
                                  GstClockTime duration) {
@@ -126,9 +133,10 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
       report.dmd.sensitivity, "solver", gst_qdmd_background_solver_get_type(),
       gint(report.dmd.solver), "estimator", gst_qdmd_background_estimator_get_type(),
       gint(report.dmd.estimator), "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged),
-      "replaced", G_TYPE_BOOLEAN, gboolean(report.replaced), "foreground-ratio", G_TYPE_DOUBLE,
-      report.foreground.ratio, "solve-time", G_TYPE_DOUBLE, report.solve_time, "sample-step",
-      G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT, guint(report.iterations),
+      "replaced", G_TYPE_BOOLEAN, gboolean(report.replaced), "settled", G_TYPE_BOOLEAN,
+      gboolean(report.settled), "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
+      "solve-time", G_TYPE_DOUBLE, report.solve_time, "sample-step", G_TYPE_UINT,
+      guint(report.sample_step), "iterations", G_TYPE_UINT, guint(report.iterations),
       "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame", G_TYPE_DOUBLE,
       counters.time_per_frame, nullptr);
   add_spectrum(report.dmd, message);

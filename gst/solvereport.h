@@ -19,6 +19,9 @@ struct Counters {
 // The property `stats`.
 GstStructure* make_stats(const SolveReport& report, const Counters& counters);
 
+// The first background that can be trusted: the camera has found its exposure.
+GstStructure* make_ready_message(const GstSegment& segment, GstClockTime timestamp);
+
 // The element message of a solve. timestamp and duration: of the frames that come out with it.
 GstStructure* make_solve_message(const SolveReport& report, const Counters& counters,
                                  const GstSegment& segment, GstClockTime timestamp,

@@ -164,5 +164,27 @@ TEST(Messages, OfAnotherScene) {
   }
 }
 
+// Bars, under a light that is looked for until a frame.
+TEST(Messages, OfBeingReady) {
+  for (const char* mode : {"batch", "live"})
+    for (const int dark : {0, 40}) {
+      Stream stream(std::string("qdmdbackground window-size=10 mode=") + mode, GST_VIDEO_FORMAT_RGB,
+                    96, 64);
+      Element element(stream);
+      const auto street = [&](int t, int x, int, uint8_t rgb[3]) {
+        const int bar = x / 8 % 2;
+        for (int c = 0; c < 3; ++c)
+          rgb[c] = static_cast<uint8_t>(t < dark ? 2 + 3 * bar : 60 + 90 * bar + 10 * c);
+      };
+      stream.push_many(0, 100, street);
+      EXPECT_TRUE(element.messages().empty()) << mode << ' ' << dark;
+      ASSERT_EQ(1u, element.ready().size()) << mode << ' ' << dark;
+      if (dark == 0)
+        EXPECT_LE(element.ready()[0], 12 * kFrame) << mode;
+      else
+        EXPECT_GE(element.ready()[0], (dark - 10) * kFrame) << mode;
+    }
+}
+
 }  // namespace
 }  // namespace qdmd::test

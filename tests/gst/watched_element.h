@@ -39,11 +39,24 @@ class Element {
   bool save(const std::string& file) { return call(element_, "save", file.c_str()); }
   bool load(const std::string& file) { return call(element_, "load", file.c_str()); }
   // The caller's, since the last call of this or of those that follow; other messages are dropped.
+  // Those that the element is ready are counted, and not among them.
   std::vector<GstMessage*> messages(GstMessageType type = GST_MESSAGE_ELEMENT) {
     std::vector<GstMessage*> all;
-    while (GstMessage* message = gst_bus_pop_filtered(bus_, type)) all.push_back(message);
+    while (GstMessage* message = gst_bus_pop_filtered(bus_, type)) {
+      const GstStructure* s = gst_message_get_structure(message);
+      if (type != GST_MESSAGE_ELEMENT || !gst_structure_has_name(s, "qdmdbackground-ready")) {
+        all.push_back(message);
+        continue;
+      }
+      GstClockTime time = GST_CLOCK_TIME_NONE;
+      gst_structure_get_uint64(s, "timestamp", &time);
+      ready_.push_back(time);
+      gst_message_unref(message);
+    }
     return all;
   }
+  // When messages() saw that the element was ready.
+  const std::vector<GstClockTime>& ready() const { return ready_; }
   int latency_messages() {
     const auto all = messages(GST_MESSAGE_LATENCY);
     for (GstMessage* message : all) gst_message_unref(message);
@@ -90,6 +103,7 @@ class Element {
  private:
   GstElement* element_;
   GstBus* bus_;
+  std::vector<GstClockTime> ready_;
 };
 
 }  // namespace qdmd::test

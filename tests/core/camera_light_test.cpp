@@ -1,0 +1,286 @@
+// Light as cameras have it: samples at the end of their range, exposure that swings or is looked
+// for, and colours that go; and what they are told by.
+#include <algorithm>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "core/foreground/grey.h"
+#include "core/learn/robust/colour_map.h"
+#include "core/learn/robust/exposure_watch.h"
+#include "core/learn/robust/light.h"
+#include "core/scene/scene.h"
+#include "tests/core/robust_util.h"
+
+namespace qdmd::test {
+namespace {
+
+// ---- Bounds ----
+
+TEST(ClippedSamples, AreBounds) {
+  const Gain bright = {1.5f, 1.5f, 1.5f};
+  const std::array<float, 3> wall = {200, 120, 90};
+  // 300 is more than there can be.
+  EXPECT_TRUE(may_show({255, 180, 135}, wall, bright));
+  EXPECT_EQ(unclipped({255, 180, 135}, wall, bright), (std::array<float, 3>{300, 180, 135}));
+  // A channel that is no bound says that something else is there.
+  EXPECT_FALSE(may_show({255, 60, 135}, wall, bright));
+  EXPECT_EQ(unclipped({255, 60, 135}, wall, bright), (std::array<float, 3>{255, 60, 135}));
+  // What is darker than it would be is no bound either.
+  EXPECT_FALSE(may_show({150, 180, 135}, wall, bright));
+  // White paving in less light: it is at least so bright.
+  const Gain dark = {0.8f, 0.8f, 0.8f};
+  EXPECT_TRUE(may_show({255, 255, 255}, {255, 255, 255}, dark));
+  EXPECT_TRUE(may_show({230, 230, 230}, {255, 255, 255}, dark));
+  EXPECT_FALSE(may_show({120, 120, 120}, {255, 255, 255}, dark));
+}
+
+// Random cells, of which many are bright, under a light that swings.
+TEST(ClippedSamples, LeaveTheGainsRight) {
+  const Grid grid = grid_of(20, 30);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> level(30, 230);
+  std::normal_distribution<float> noise(0, 1);
+  std::vector<float> scene(3 * grid.cells());
+  for (float& sample : scene) sample = level(random);
+  constexpr int kFrames = 60;
+  GridFrames frames(grid, kFrames);
+  const auto truth = [](int t) {
+    return 1.4f + 0.5f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 40);
+  };
+  for (int t = 0; t < kFrames; ++t)
+    for (int c = 0; c < 3; ++c)
+      for (size_t i = 0; i < grid.cells(); ++i)
+        frames.plane(t, c)[i] =
+            std::clamp(scene[static_cast<size_t>(c) * grid.cells() + i] * truth(t) + noise(random),
+                       0.0f, 255.0f);
+  GridFrames median;
+  const WindowLight light = light_of(frames, kFrames, nullptr, &median);
+  EXPECT_TRUE(light.clips);
+  const float unit = truth(30) / light.gains[30][0];
+  for (int t = 0; t < kFrames; ++t)
+    for (size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(light.gains[static_cast<size_t>(t)][c] * unit / truth(t), 1, 0.02) << t;
+  // What is behind clipped samples is known from the darker frames, whose light is 1.
+  EXPECT_LT(unit, 1.1f);
+  for (int c = 0; c < 3; ++c)
+    for (size_t i = 0; i < grid.cells(); ++i)
+      EXPECT_NEAR(median.plane(0, c)[i], scene[static_cast<size_t>(c) * grid.cells() + i] * unit,
+                  6);
+}
+
+TEST(ClippedSamples, WhiteThatStaysIsNoSwing) {
+  const Grid grid = grid_of(12, 16);
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 1);
+  GridFrames frames(grid, 30);
+  for (int t = 0; t < 30; ++t)
+    for (int c = 0; c < 3; ++c)
+      for (size_t i = 0; i < grid.cells(); ++i)
+        frames.plane(t, c)[i] = i % 3 == 0 ? 255 : 100 + static_cast<float>(i % 50) + noise(random);
+  const WindowLight light = light_of(frames, 30);
+  EXPECT_FALSE(light.clips);
+  for (const Gain& gain : light.gains) EXPECT_EQ(gain, kSameLight);
+}
+
+// ---- Colours ----
+
+TEST(Grey, IsToldByTheContent) {
+  constexpr size_t kWidth = 120, kHeight = 90;
+  constexpr uint8_t kBlack[3] = {0, 0, 0}, kNeutral[3] = {16, 128, 128};
+  std::mt19937 random(7);
+  std::vector<uint8_t> planes[3];
+  for (auto& plane : planes) plane.resize(kWidth * kHeight);
+  const uint8_t* const x[3] = {planes[0].data(), planes[1].data(), planes[2].data()};
+  for (size_t p = 0; p < kWidth * kHeight; ++p) {
+    const auto level = static_cast<uint8_t>(20 + random() % 200);
+    for (size_t c = 0; c < 3; ++c)
+      planes[c][p] = static_cast<uint8_t>(level + static_cast<uint8_t>(random() % 3));
+  }
+  EXPECT_TRUE(is_grey(x, kWidth, kHeight, Colours::rgb, kBlack));
+  EXPECT_FALSE(is_grey(x, kWidth, kHeight, Colours::yuv, kNeutral));
+  for (size_t c : {1, 2}) std::fill(planes[c].begin(), planes[c].end(), uint8_t{128});
+  EXPECT_TRUE(is_grey(x, kWidth, kHeight, Colours::yuv, kNeutral));
+  EXPECT_FALSE(is_grey(x, kWidth, kHeight, Colours::rgb, kBlack));
+  EXPECT_TRUE(is_grey(x, kWidth, kHeight, Colours::grey, kBlack));
+  // A red lamp in a grey picture.
+  for (size_t y = 0; y < 30; ++y)
+    std::fill_n(planes[2].begin() + static_cast<ptrdiff_t>(y * kWidth), 30, uint8_t{200});
+  EXPECT_FALSE(is_grey(x, kWidth, kHeight, Colours::yuv, kNeutral));
+}
+
+TEST(ColourMaps, InfraRedIsFoundBehindPeople) {
+  constexpr size_t kCells = 600;
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> level(10, 230);
+  std::normal_distribution<float> noise(0, 1);
+  std::vector<float> scene[3], frame[3];
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t i = 0; i < kCells; ++i) scene[c].push_back(level(random));
+    frame[c].resize(kCells);
+  }
+  const float weight[3] = {0.34f, 0.6f, 0.13f};
+  for (size_t i = 0; i < kCells; ++i) {
+    float luma = 4 + noise(random);
+    for (size_t c = 0; c < 3; ++c) luma += weight[c] * scene[c][i];
+    // A fifth is hidden.
+    if (i < kCells / 5) luma = 30;
+    for (size_t c = 0; c < 3; ++c) frame[c][i] = luma;
+  }
+  const float* const before[3] = {scene[0].data(), scene[1].data(), scene[2].data()};
+  const float* const now[3] = {frame[0].data(), frame[1].data(), frame[2].data()};
+  EXPECT_EQ(colouring_of(before, kCells, Colours::rgb), Colouring::some);
+  EXPECT_EQ(colouring_of(now, kCells, Colours::rgb), Colouring::none);
+  EXPECT_EQ(colouring_of(now, kCells, Colours::grey), Colouring::little);
+  const auto map = find_colour_map(now, before, kCells);
+  ASSERT_TRUE(map);
+  for (const auto& row : map->row) {
+    for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(row[c], weight[c], 0.01);
+    EXPECT_NEAR(row[3], 4, 2);
+  }
+  // Nothing explains another picture.
+  for (size_t c = 0; c < 3; ++c)
+    for (float& sample : frame[c]) sample = level(random);
+  EXPECT_FALSE(find_colour_map(now, before, kCells));
+  // One colour has a map, too.
+  for (size_t c = 0; c < 3; ++c) {
+    std::fill(scene[c].begin(), scene[c].end(), 50.0f + 30 * static_cast<float>(c));
+    std::fill(frame[c].begin(), frame[c].end(), 90.0f);
+  }
+  ASSERT_TRUE(find_colour_map(now, before, kCells));
+  EXPECT_NEAR(find_colour_map(now, before, kCells)->of({50, 80, 110})[1], 90, 1);
+}
+
+// ---- The exposure of a camera that starts ----
+
+TEST(ExposureWatch, WaitsUntilTheLightRests) {
+  const auto settles = [](const std::function<float(int)>& mean) {
+    ExposureWatch watch;
+    std::vector<float> plane(16);
+    const float* const cells[3] = {plane.data(), plane.data(), plane.data()};
+    for (int t = 0; t < 1000; ++t) {
+      std::fill(plane.begin(), plane.end(), mean(t));
+      watch.follow(cells, plane.size());
+      if (watch.settled()) return std::pair{t, watch.has_found()};
+    }
+    return std::pair{-1, false};
+  };
+  EXPECT_EQ(settles([](int) { return 90.0f; }), (std::pair{9, false}));
+  // Black for two seconds, and then brighter than it will be.
+  const auto start = settles([](int t) {
+    return t < 50 ? 4.0f : t < 125 ? 200 - static_cast<float>(t - 50) : 125.0f;
+  });
+  EXPECT_GE(start.first, 125);
+  EXPECT_LE(start.first, 135);
+  EXPECT_TRUE(start.second);
+  // Nobody waits for ever.
+  EXPECT_EQ(settles([](int) { return 3.0f; }).first, steps::exposure::kLongest - 1);
+}
+
+// ---- Streams ----
+
+constexpr int kWidth = 160, kHeight = 120, kFrames = 420;
+
+struct Camera {
+  const char* name;
+  // A sample of channel c in that frame; luma: of its pixel.
+  std::function<float(int frame, float sample, float luma)> shows;
+  int counts_from;
+};
+
+const Camera kCameras[] = {
+    {"clip",
+     [](int t, float sample, float) {
+       return sample * 1.15f *
+              (1 + 0.2f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100));
+     },
+     100},
+    {"glare",
+     [](int t, float sample, float) {
+       return sample * 1.7f *
+              (1 + 0.25f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100));
+     },
+     100},
+    {"start",
+     [](int t, float sample, float) {
+       return sample * (t < 50    ? 0.06f
+                        : t < 125 ? 2.2f - 1.2f * static_cast<float>(t - 50) / 75
+                                  : 1.0f);
+     },
+     150},
+    {"infrared", [](int t, float sample, float luma) { return t < 200 ? sample : 1.15f * luma; },
+     100},
+    {"night and day",
+     [](int t, float sample, float luma) { return t < 150 || t >= 280 ? sample : 1.15f * luma; },
+     100},
+    {"grey", [](int, float, float luma) { return luma; }, 100},
+};
+
+// F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
+// picture.
+std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed) {
+  scene::SceneOptions how;
+  how.width = kWidth, how.height = kHeight, how.frames_per_second = 25, how.seed = seed;
+  scene::Scene scene(how, "basic");
+  Engine engine;
+  EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  Wishes wishes = first_wishes(options);
+  std::vector<std::vector<bool>> truth;
+  double both = 0, sum = 0;
+  int left = 0, wrong = 0;
+  const auto take = [&] {
+    for (; engine.next(); ++left) {
+      PackedPicture mask(kWidth, kHeight);
+      engine.next()->pop(Output::mask, mask.out());
+      if (left < camera.counts_from) continue;
+      int differ = 0;
+      for (size_t p = 0; p < truth[0].size(); ++p) {
+        const bool white = mask.at(0, p) > 127, right = truth[static_cast<size_t>(left)][p];
+        both += white && right, sum += white + right, differ += white != right;
+      }
+      wrong += 50 * differ > kWidth * kHeight;
+    }
+  };
+  for (int t = 0; t < kFrames; ++t) {
+    scene.render(t, scene::kFrame | scene::kLabels);
+    PackedPicture picture(kWidth, kHeight);
+    std::vector<uint8_t> planes(3 * size_t{kWidth} * kHeight);
+    const auto& samples = scene.frame().samples;
+    std::vector<bool>& is_foreground = truth.emplace_back();
+    for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p) {
+      const float luma =
+          0.299f * samples[3 * p] + 0.587f * samples[3 * p + 1] + 0.114f * samples[3 * p + 2];
+      for (size_t c = 0; c < 3; ++c)
+        planes[c * kWidth * kHeight + p] = byte_of(camera.shows(t, samples[3 * p + c], luma));
+      is_foreground.push_back(scene.labels().samples[p] > 127);
+    }
+    picture.fill(planes);
+    EXPECT_TRUE(engine.push(picture.in(), &wishes).ok());
+    take();
+  }
+  EXPECT_TRUE(engine.drain().ok());
+  take();
+  EXPECT_EQ(left, kFrames);
+  return {2 * both / sum, wrong};
+}
+
+class CameraLight : public testing::TestWithParam<Mode> {};
+INSTANTIATE_TEST_SUITE_P(Modes, CameraLight, testing::Values(Mode::batch, Mode::live),
+                         [](const auto& mode) {
+                           return mode.param == Mode::live ? "Live" : "Batch";
+                         });
+
+TEST_P(CameraLight, MasksStayRight) {
+  for (const Camera& camera : kCameras)
+    for (const uint64_t seed : {3, 7}) {
+      EngineOptions options = robust_of(100);
+      options.mode = GetParam();
+      const auto [f, wrong] = score(camera, options, seed);
+      RecordProperty(camera.name, std::to_string(f));
+      EXPECT_GE(f, 0.9) << camera.name << ", seed " << seed;
+      EXPECT_LE(wrong, 10) << camera.name << ", seed " << seed;
+    }
+}
+
+}  // namespace
+}  // namespace qdmd::test
