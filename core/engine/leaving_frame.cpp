@@ -38,6 +38,14 @@ uint64_t LeavingFrame::soft_bytes() const {
 
 Pose LeavingFrame::pose() const { return frames().pose(slot()); }
 
+bool LeavingFrame::next_uncovered(UncoveredPlace* place) {
+  meet();
+  UncoveredPlaces* const places = stage_.background->learner().uncovered();
+  const int64_t number =
+      static_cast<int64_t>(frames().frames_taken()) - frames().size() + schedule_->next_index();
+  return places && places->take(number, place);
+}
+
 // Once a frame.
 void LeavingFrame::meet() {
   if (done_.meet) return;

@@ -33,6 +33,10 @@ class LeavingFrame {
   void foreground(uint8_t* mask, uint8_t* residual);
   // Where the camera looked.
   Pose pose() const;
+  // The next place, each once, where this frame and those before it show that something has left
+  // which belonged to the background; places are those of the canvas. False: there is none.
+  // Method::robust only.
+  bool next_uncovered(UncoveredPlace* place);
   // It leaves. Call it once its pictures are written, if anybody wants some.
   void skip();
   // write() in the configured levels, and skip().

@@ -121,7 +121,7 @@ RegionFinder& RegionFinder::operator=(RegionFinder&&) noexcept = default;
 RegionFinder::~RegionFinder() = default;
 
 const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t* residual,
-                                              int width, int height, int least_area) {
+                                              int width, int height, int least_area, bool apart) {
   if (!memory_) memory_ = std::make_unique<Memory>();
   auto& [stretches, rows, named, regions] = *memory_;
   stretches.clear(), rows.clear(), named.clear(), regions.clear();
@@ -148,6 +148,7 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
   }
   std::sort(regions.begin(), regions.end(), comes_before);
   if (regions.size() > kMostRegions) regions.resize(kMostRegions);
+  if (apart) return regions;
   merge_overlapping(&regions);
   std::sort(regions.begin(), regions.end(), comes_before);
   return regions;

@@ -39,6 +39,7 @@ void FrameFollower::forget() {
   looks_.forget();
   memory_.forget();
   absorbed_.forget();
+  uncovered_.forget();
   scene_.forget();
   other_scene_ = scene_begins_ = false;
   calm_ = 0;

@@ -43,6 +43,7 @@ class FrameFollower {
   // As those of a Learner.
   void mend(const Learner::Compared& frame, BackgroundModel* model);
   void look_ahead(const Learner::Compared& frame, BackgroundModel* model);
+  UncoveredPlaces* uncovered() { return &uncovered_; }
   void set_absorb_frames(int64_t frames) { absorb_frames_ = frames; }
   SceneSeen scene_of(int slot);
   void begin_scene();
@@ -73,6 +74,7 @@ class FrameFollower {
   };
   Cells background() const { return {background_cells_, published_}; }
   bool is_calm() const;
+  void note_uncovered(const std::vector<int>& cells, const StandingLooks& looks, int64_t number);
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
                        const BackgroundModel* of_window);
   void mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
@@ -92,6 +94,7 @@ class FrameFollower {
   SceneMemory memory_;   // what frames that came showed
   StandingLooks looks_;  // what frames showed when they were compared, in batch
   HistoryStarts absorbed_;
+  UncoveredPlaces uncovered_;
   int64_t absorb_frames_ = 0;
   SceneWatch scene_;
   // Solves in a row that changed little, since a cell was mended.

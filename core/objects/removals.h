@@ -1,0 +1,35 @@
+// What was taken away from the background, gathered from the places that were uncovered.
+#pragma once
+
+#include <vector>
+
+#include "core/objects/object.h"
+
+namespace qdmd {
+
+// A place where frames show that something has left which belonged to the background.
+struct RemovedPlace {
+  ObjectBox box;
+  double stood_seconds = 0;  // it had been there for so long
+};
+
+// Places are found piece by piece. What is uncovered next to another piece, not long after it, is
+// of the same thing; it is told once nothing more was found for kSettles seconds.
+class Removals {
+ public:
+  static constexpr double kSettles = 0.4;
+
+  void forget() { of_.clear(); }
+  void add(const RemovedPlace& place, int64_t time, double reach);
+  // The next that is complete at that time: its box. False: there is none.
+  bool take(int64_t time, ObjectBox* box);
+
+ private:
+  struct Removal {
+    ObjectBox box;
+    int64_t newest;
+  };
+  std::vector<Removal> of_;
+};
+
+}  // namespace qdmd

@@ -1,0 +1,36 @@
+// What the masks of simulated scenes show, and what is true of them.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "core/foreground/regions.h"
+#include "core/objects/object_tracker.h"
+#include "tests/evaluation/object_scores.h"
+
+namespace qdmd::evaluation {
+
+struct ObservedFrame {
+  std::vector<Region> regions;  // of the element's mask, apart
+  std::vector<RemovedPlace> removed;
+  std::vector<NumberedBox> truth;
+};
+
+struct ObservedScene {
+  std::string scene;
+  uint64_t seed = 0;
+  int width = 0, height = 0;
+  double rate = 25;
+  std::vector<ObservedFrame> frames;
+};
+
+// Runs the engine over a scene of 320x240 pixels.
+ObservedScene observe(const std::string& scene, uint64_t seed, int frames, bool live);
+
+// To a file and back, so that trackers can be compared without masks being made anew.
+void write(const ObservedScene& scene, std::ostream* out);
+bool read(std::istream* in, ObservedScene* scene);
+
+}  // namespace qdmd::evaluation
