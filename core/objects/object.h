@@ -63,7 +63,7 @@ struct ObjectEvent {
   enum class Kind {
     appeared,       // a thing, and no leaf or speck, was seen for ObjectOptions::appear_seconds
     stopped,        // it came here and stands for stop_seconds
-    left_behind,    // it stands, never moved by itself, and whatever brought it went
+    left_behind,    // it stands, never moved, and what brought it went stop_seconds ago
     removed,        // something that belonged to the background was taken
     moved_on,       // what stopped, or was left behind, goes on
     gone,           // nothing showed it for gone_seconds
@@ -80,6 +80,10 @@ struct ObjectOptions {
   double min_size = 1.0 / 60;
   // Seconds; and at least three frames. See ObjectEvent::Kind.
   double appear_seconds = 0.2, stop_seconds = 2, gone_seconds = 1, grace_seconds = 3;
+  // What belonged to the background had been there for so long.
+  double removed_seconds = 4;
+  // Nothing is told before so much of the stream is known.
+  double settle_seconds = 2;
 };
 
 }  // namespace qdmd

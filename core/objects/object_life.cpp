@@ -26,26 +26,48 @@ double distance(const ObjectBox& a, const ObjectBox& b) {
 
 double ObjectLife::still() const { return std::max(kPixels, kStill * box_.longer()); }
 
-// A thing stands since the earliest place from which on it stayed near to where it is now.
+double ObjectLife::way(const ObjectBox& from, const ObjectBox& to) const {
+  const auto along = [](double low, double high, bool at_low, bool at_high) {
+    if (at_low && at_high) return 0.0;
+    if (at_low) return std::abs(high);
+    if (at_high) return std::abs(low);
+    return low * high > 0 ? std::min(std::abs(low), std::abs(high)) : 0;
+  };
+  const auto at_start = [](double from_low, double to_low) {
+    return std::min(from_low, to_low) <= kPixels;
+  };
+  const auto at_end = [](double from_high, double to_high, int end) {
+    return std::max(from_high, to_high) >= end - kPixels;
+  };
+  return std::hypot(along(to.x - from.x, to.right() - from.right(), at_start(from.x, to.x),
+                          at_end(from.right(), to.right(), width_)),
+                    along(to.y - from.y, to.bottom() - from.bottom(), at_start(from.y, to.y),
+                          at_end(from.bottom(), to.bottom(), height_)));
+}
+
+// The earliest place from which on it stayed near to where it is now.
+std::deque<ObjectLife::Place>::const_iterator ObjectLife::stays_from() const {
+  auto since = places_.end();
+  while (since != places_.begin() && distance(box_, std::prev(since)->box) <= still()) --since;
+  return since;
+}
+
 void ObjectLife::judge_standing(int64_t time, int64_t stop) {
-  const Place& now = places_.back();
-  const auto away = [&](const Place& from) { return std::hypot(now.x - from.x, now.y - from.y); };
   if (stands_) {
-    if (away(*stood_at_) > std::max(2 * kPixels, kMovedOn * box_.longer())) {
+    if (distance(box_, stood_at_->box) > std::max(2 * kPixels, kMovedOn * box_.longer())) {
       stands_ = false;
       places_.erase(places_.begin(), places_.end() - 1);
     }
     return;
   }
-  auto since = places_.end();
-  while (since != places_.begin() && away(*std::prev(since)) <= still()) --since;
-  if (since == places_.end() || time - since->time < stop) return;
+  const auto since = stays_from();
+  if (time - since->time < stop) return;
   stands_ = true;
   standing_since_ = since->time;
-  stood_at_ = now;
+  stood_at_ = places_.back();
 }
 
-void ObjectLife::follow(const ObjectBox* box, int64_t time, int64_t frame) {
+void ObjectLife::follow(const ObjectBox* box, bool alone, int64_t time, int64_t frame) {
   ++frames_;
   if (!box) {
     gone_ = first_ && time - last_ >= time_of(options_->gone_seconds, frame);
@@ -54,40 +76,35 @@ void ObjectLife::follow(const ObjectBox* box, int64_t time, int64_t frame) {
   ++seen_;
   box_ = *box;
   last_ = time;
-  const Place now = {time, box->middle_x(), box->middle_y()};
+  if (alone && alone_since_ == kNoTime) alone_since_ = time;
   longest_ = std::max(longest_, box->longer());
-  if (!first_) first_ = before_ = now;
+  if (!first_) {
+    first_ = {time, *box};
+    before_ = *box;
+  }
   // Boxes tremble: that is no way.
-  if (const double step = std::hypot(now.x - before_.x, now.y - before_.y); step > 2 * kPixels) {
+  if (const double step = distance(box_, before_); step > 2 * kPixels) {
     way_ += step;
-    before_ = now;
+    before_ = *box;
   }
   const int64_t stop = time_of(options_->stop_seconds, frame);
-  places_.push_back(now);
+  places_.push_back({time, *box});
   // One that is older than `stop` stays, from which on it may have stood.
   while (places_.size() > 2 && time - places_[1].time >= stop) places_.pop_front();
-  const double gone = std::hypot(now.x - first_->x, now.y - first_->y);
+  double largest = 0;
+  for (const Place& place : places_) largest = std::max(largest, place.box.area());
+  if (2 * box->area() >= largest) last_whole_ = *box;
+  const double gone = way(first_->box, *box);
   came_ |= gone >= box_.longer() / 2;
   judge_standing(time, stop);
-
-  auto third = places_.begin();
-  while (std::next(third) != places_.end() &&
-         time - third->time > static_cast<int64_t>(kSecond) / 3)
-    ++third;
-  const double seconds = static_cast<double>(time - third->time) / kSecond;
-  speed_ = seconds > 0 ? std::hypot(now.x - third->x, now.y - third->y) / seconds : 0;
-
+  was_left_ = stands_ && !came_ && alone_since_ != kNoTime && time - alone_since_ >= stop;
   if (appeared_) return;
-  const int64_t seen = time - first_->time;
   const double enough = std::max(2 * kPixels, std::min(longest_ / 2, kWay * height_));
   const bool goes = gone >= enough && gone >= kStraight * way_ &&
-                    seen >= time_of(options_->appear_seconds, frame);
-  auto stays = places_.end();
-  while (stays != places_.begin() &&
-         std::hypot(now.x - std::prev(stays)->x, now.y - std::prev(stays)->y) <= still())
-    --stays;
-  const bool stood = stays != places_.end() &&
-                     time - stays->time >= time_of(kStandingShows * options_->stop_seconds, frame);
+                    time - first_->time >= time_of(options_->appear_seconds, frame);
+  const bool stood =
+      alone_since_ != kNoTime && time - std::max(stays_from()->time, alone_since_) >=
+                                     time_of(kStandingShows * options_->stop_seconds, frame);
   appeared_ =
       longest_ >= options_->min_size * height_ && seen_ >= kMostFrames * frames_ && (goes || stood);
 }

@@ -8,59 +8,64 @@
 
 namespace qdmd {
 
-// One thing whose box is told frame by frame. Sides and ways are in pixels of the picture.
+// One thing whose box is told frame by frame. Sides and ways are in pixels of the picture. A box
+// that grows on one side has not gone anywhere: its way is that of the side that moved less, but at
+// the edge of the picture, where the thing comes in.
 // | a thing      | once                                                                           |
 // |--------------|--------------------------------------------------------------------------------|
 // | appeared     | its longer side is min_size, it was seen for appear_seconds, in most frames,   |
 // |              | and it went straight on by half its longer side or kWay of the height,         |
-// |              | whichever is less; or it stood for kStandingShows of stop_seconds              |
+// |              | whichever is less; or it stood for kStandingShows of stop_seconds, alone       |
 // | stands       | its middle stayed within kStill of its longer side for stop_seconds            |
+// | was left     | it stands where it was first seen, and has been alone for stop_seconds         |
 // | moved on     | it stood, and its middle is kMovedOn of its longer side away from there        |
 // | gone         | no frame showed it for gone_seconds                                            |
 class ObjectLife {
  public:
   static constexpr double kWay = 1.0 / 30, kStill = 0.06, kMovedOn = 0.25, kStandingShows = 0.5;
 
-  ObjectLife(const ObjectOptions& options, int picture_height)
-      : options_(&options), height_(picture_height) {}
+  ObjectLife(const ObjectOptions& options, int picture_width, int picture_height)
+      : options_(&options), width_(picture_width), height_(picture_height) {}
 
-  // A frame showed it, or did not (null). time: of the frame, later than that of the one before.
-  // frame: nanoseconds that frames last.
-  void follow(const ObjectBox* box, int64_t time, int64_t frame);
-
+  // A frame showed it, or did not (null). alone: nothing that moves is beside it; what stands where
+  // it was put down is seen for itself from the first time on that it is alone. time: of the frame,
+  // later than that of the one before. frame: nanoseconds that frames last.
+  void follow(const ObjectBox* box, bool alone, int64_t time, int64_t frame);
   // Frames of so many nanoseconds said nothing.
   void wait(int64_t time) { last_ += time; }
 
   bool appeared() const { return appeared_; }
   // It stands, since then; or kNoTime.
   int64_t standing_since() const { return stands_ ? standing_since_ : kNoTime; }
-  // It has come here by its own motion: it went further than its own size's half since it was first
-  // seen.
+  // It has come here by its own motion: it went further than half its size since it was first seen.
   bool came_by_itself() const { return came_; }
-  // It has moved since it stood last, or stood never.
+  // It stands where it was first seen, and has been for itself for stop_seconds.
+  bool was_left() const { return was_left_; }
   bool moves() const { return !stands_; }
   bool gone() const { return gone_; }
-  // Pixels a second, a mean of the last third of a second.
-  double speed() const { return speed_; }
+  // The last box that was not small beside those before it: what goes out over the edge of the
+  // picture is not cut off there.
+  const ObjectBox& last_whole() const { return last_whole_; }
 
  private:
   struct Place {
     int64_t time;
-    double x, y;
+    ObjectBox box;
   };
   double still() const;
+  double way(const ObjectBox& from, const ObjectBox& to) const;
+  std::deque<Place>::const_iterator stays_from() const;
   void judge_standing(int64_t time, int64_t stop);
 
   const ObjectOptions* options_;
-  int height_;
-  ObjectBox box_;
+  int width_, height_;
+  ObjectBox box_, last_whole_, before_;
   std::deque<Place> places_;  // of the last stop_seconds
   std::optional<Place> first_, stood_at_;
-  Place before_ = {};
-  double longest_ = 0, way_ = 0, speed_ = 0;
-  int64_t last_ = 0, standing_since_ = kNoTime;
+  double longest_ = 0, way_ = 0;
+  int64_t last_ = 0, standing_since_ = kNoTime, alone_since_ = kNoTime;
   int frames_ = 0, seen_ = 0;
-  bool appeared_ = false, came_ = false, stands_ = false, gone_ = false;
+  bool appeared_ = false, came_ = false, stands_ = false, gone_ = false, was_left_ = false;
 };
 
 }  // namespace qdmd

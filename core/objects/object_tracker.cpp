@@ -6,10 +6,6 @@
 namespace qdmd {
 namespace {
 
-// What the way of a measured box from where it was expected counts for the velocity.
-constexpr double kVelocityGain = 0.25;
-// In a region that things share, edges count that much.
-constexpr double kSharedPlaceGain = 0.5, kSharedVelocityGain = 0.05;
 // Pairs that are worse are none: 1 - overlap, and half the distance of the middles in units of the
 // longer side.
 constexpr double kMostCost = 1.45, kOfDistance = 0.5, kNoPair = 1e6;
@@ -19,8 +15,11 @@ constexpr double kInside = 0.5;
 constexpr double kGrows = 1.3;
 // Seconds that an unseen thing goes on as it went; that which has not appeared waits for so long.
 constexpr double kGoesOn = 0.5, kWaits = 0.2;
-// So large a share of the picture is no object.
-constexpr double kMostOfPicture = 0.6;
+// So large a share of the picture is no thing.
+constexpr double kMostOfPicture = 1.0 / 3;
+// What was removed is told if its pieces fill so large a share of its box, and its longer side is
+// so large a share of the picture's height: places are found in cells.
+constexpr double kLeastRemoved = 1.0 / 20;
 // A thing inside another one whose region has room for that one alone has gone, after seconds.
 constexpr double kDouble = 0.8, kHidden = 2;
 
@@ -44,7 +43,7 @@ void ObjectTracker::begin(int width, int height, const ObjectOptions& options) {
   width_ = width, height_ = height;
   tracks_.clear(), objects_.clear(), events_.clear();
   removals_.forget();
-  time_ = moved_ = kNoTime;
+  time_ = moved_ = begun_ = kNoTime;
   frame_ = 0;
   in_motion_ = false;
 }
@@ -60,15 +59,11 @@ void ObjectTracker::add(ObjectEvent::Kind kind, const Object& object, bool cut_o
 
 void ObjectTracker::predict(double seconds) {
   for (Track& track : tracks_) {
-    Object& object = track.object;
     track.region = -1;
     track.seen = false;
-    track.expected = object.box;
     const double unseen = static_cast<double>(time_ - track.last_seen) / kSecond;
-    if (track.life.standing_since() != kNoTime || unseen > kGoesOn) continue;
-    const double on = std::min(seconds, kGoesOn);
-    track.expected.x += object.vx * on;
-    track.expected.y += object.vy * on;
+    const bool stays = track.life.standing_since() != kNoTime || unseen > kGoesOn + seconds;
+    track.expected = track.motion.expect(stays ? 0 : std::min(seconds, kGoesOn));
   }
 }
 
@@ -79,8 +74,9 @@ void ObjectTracker::assign(const ObjectFrame& frame) {
   for (size_t t = 0; t < tracks_.size(); ++t)
     for (size_t r = 0; r < regions; ++r)
       // Of two, the one that is known for longer.
-      cost_[t * regions + r] =
-          cost_of(tracks_[t].expected, boxes_[r]) + (tracks_[t].object.appeared ? 0 : 0.2);
+      cost_[t * regions + r] = tracks_[t].went_out ? kNoPair
+                                                   : cost_of(tracks_[t].expected, boxes_[r]) +
+                                                         (tracks_[t].object.appeared ? 0 : 0.2);
   const std::vector<int>& pairs = assignment_.solve(cost_, tracks_.size(), regions);
   for (size_t t = 0; t < tracks_.size(); ++t) {
     if (pairs[t] < 0 || cost_[t * regions + static_cast<size_t>(pairs[t])] >= kNoPair) continue;
@@ -93,7 +89,7 @@ void ObjectTracker::assign(const ObjectFrame& frame) {
 // Things without a region of their own, in that of another one.
 void ObjectTracker::share_regions(const ObjectFrame& frame) {
   for (Track& track : tracks_) {
-    if (track.seen) continue;
+    if (track.seen || track.went_out) continue;
     double most = kInside * track.expected.area();
     for (size_t r = 0; r < frame.regions.size(); ++r) {
       const double inside = shared(track.expected, boxes_[r]);
@@ -148,24 +144,25 @@ void ObjectTracker::take_pieces(const ObjectFrame& frame) {
 }
 
 void ObjectTracker::begin_tracks(const ObjectFrame& frame) {
-  const size_t known = tracks_.size();
   for (size_t r = 0; r < frame.regions.size(); ++r) {
     if (owner_[r] >= 0) continue;
-    Track track = {{}, ObjectLife(options_, height_), boxes_[r], static_cast<int>(r), true};
+    const ObjectBox& box = boxes_[r];
+    Track track = {{},
+                   ObjectLife(options_, width_, height_),
+                   ObjectMotion(box, width_, height_),
+                   box,
+                   static_cast<int>(r),
+                   true};
     track.object.id = next_id_++;
-    track.object.box = boxes_[r];
     track.object.first_time = frame.time;
     track.object.first_stamp = frame.stamp;
-    double most = 0;
-    for (size_t t = 0; t < known; ++t) {
-      const Track& other = tracks_[t];
-      if (!other.object.appeared) continue;
-      const double near = shared(other.object.box.wider(boxes_[r].longer() / 2), boxes_[r]);
-      if (near > most) most = near, track.carrier = other.object.id;
-    }
     owner_[r] = static_cast<int>(tracks_.size());
     tracks_.push_back(std::move(track));
   }
+}
+
+bool ObjectTracker::is_flood(const Region& region) const {
+  return region.area > kMostOfPicture * width_ * height_;
 }
 
 // Things in one region, of which each has kept its size.
@@ -182,51 +179,49 @@ void ObjectTracker::measure_together(const std::vector<size_t>& tracks, const Ob
                bottom = outermost([](const ObjectBox&b) { return -b.bottom(); });
   for (size_t t : tracks) {
     Track& track = tracks_[t];
-    Object& object = track.object;
-    object.box = track.expected;
-    object.shares_region = true;
-    if (track.life.standing_since() != kNoTime) continue;
-    const auto off = [](bool low, double by_low, bool high, double by_high) {
-      return low && high ? (by_low + by_high) / 2 : low ? by_low : high ? by_high : 0;
-    };
-    const ObjectBox& at = track.expected;
-    const double dx =
-        std::clamp(off(t == left, region.x - at.x, t == right, region.right() - at.right()),
-                   -at.width / 2, at.width / 2);
-    const double dy =
-        std::clamp(off(t == top, region.y - at.y, t == bottom, region.bottom() - at.bottom()),
-                   -at.height / 2, at.height / 2);
-    object.box.x += kSharedPlaceGain * dx;
-    object.box.y += kSharedPlaceGain * dy;
-    object.vx += kSharedVelocityGain * dx / seconds;
-    object.vy += kSharedVelocityGain * dy / seconds;
+    // What stands is where it was.
+    if (track.life.standing_since() == kNoTime) {
+      track.motion.go_on(seconds);
+      const auto off = [](bool low, double by_low, bool high, double by_high) {
+        return low && high ? (by_low + by_high) / 2 : low ? by_low : high ? by_high : 0;
+      };
+      const ObjectBox& at = track.expected;
+      track.motion.correct(
+          off(t == left, region.x - at.x, t == right, region.right() - at.right()),
+          off(t == top, region.y - at.y, t == bottom, region.bottom() - at.bottom()), seconds);
+    }
+    track.object.box = track.motion.box();
   }
 }
 
 void ObjectTracker::measure(const ObjectFrame& frame, double seconds) {
   std::vector<std::vector<size_t>> shown(frame.regions.size());
-  for (size_t t = 0; t < tracks_.size(); ++t)
-    if (tracks_[t].seen) shown[static_cast<size_t>(tracks_[t].region)].push_back(t);
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    if (tracks_[t].seen)
+      shown[static_cast<size_t>(tracks_[t].region)].push_back(t);
+    else if (tracks_[t].life.standing_since() == kNoTime &&
+             frame.time - tracks_[t].last_seen <= nanoseconds(kGoesOn))
+      tracks_[t].motion.go_on(seconds);
+  }
   for (size_t r = 0; r < frame.regions.size(); ++r) {
     if (shown[r].empty()) continue;
     const ObjectBox& region = boxes_[r];
+    const bool together = shown[r].size() > 1;
     double all = 0;
     for (size_t t : shown[r]) all += tracks_[t].expected.area();
-    if (shown[r].size() > 1) measure_together(shown[r], region, seconds);
+    if (together) measure_together(shown[r], region, seconds);
     for (size_t t : shown[r]) {
       Track& track = tracks_[t];
       Object& object = track.object;
       object.mean_residual = frame.regions[r].mean_residual;
-      const double share = shown[r].size() > 1 ? track.expected.area() / all : 1;
+      const double share = together ? track.expected.area() / all : 1;
       object.area = static_cast<int>(std::lround(share * frame.regions[r].area));
-      if (shown[r].size() == 1) {
-        object.shares_region = false;
-        const double dx = region.middle_x() - track.expected.middle_x(),
-                     dy = region.middle_y() - track.expected.middle_y();
-        object.vx += kVelocityGain * dx / seconds;
-        object.vy += kVelocityGain * dy / seconds;
+      object.shares_region = together;
+      if (!together) {
+        track.motion.follow(region, track.life.standing_since() != kNoTime, seconds);
         object.box = region;
       }
+      object.vx = track.motion.vx(), object.vy = track.motion.vy();
       track.last_seen = frame.time;
     }
   }
@@ -235,6 +230,10 @@ void ObjectTracker::measure(const ObjectFrame& frame, double seconds) {
     if (owner_[r] < 0 || !shown[r].empty()) continue;
     tracks_[static_cast<size_t>(owner_[r])].object.area += frame.regions[r].area;
   }
+  find_hidden(frame.time, shown);
+}
+
+void ObjectTracker::find_hidden(int64_t time, const std::vector<std::vector<size_t>>& shown) {
   for (Track& track : tracks_) {
     const bool with_others = track.seen && shown[static_cast<size_t>(track.region)].size() > 1;
     const bool hidden =
@@ -247,15 +246,15 @@ void ObjectTracker::measure(const ObjectFrame& frame, double seconds) {
     if (!hidden)
       track.hidden_since = kNoTime;
     else if (track.hidden_since == kNoTime)
-      track.hidden_since = frame.time;
+      track.hidden_since = time;
   }
 }
 
-bool ObjectTracker::carrier_went(const Track& track) const {
+// Nothing that moves is beside it.
+bool ObjectTracker::is_alone(const Track& track) const {
   const ObjectBox around = track.object.box.wider(track.object.box.longer() / 2);
   return std::none_of(tracks_.begin(), tracks_.end(), [&](const Track& other) {
     return &other != &track && other.seen && other.object.appeared && other.life.moves() &&
-           (track.carrier == 0 || other.object.id == track.carrier) &&
            shared(other.object.box, around) > 0;
   });
 }
@@ -264,11 +263,17 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
   using Kind = ObjectEvent::Kind;
   for (Track& track : tracks_) {
     Object& object = track.object;
-    track.life.follow(track.seen ? &object.box : nullptr, frame.time, frame_);
+    const ObjectBox box = track.motion.box();
+    track.life.follow(track.seen ? &box : nullptr, track.seen && is_alone(track), frame.time,
+                      frame_);
     const bool stood = object.standing_since != kNoTime;
     object.standing_since = track.life.standing_since();
-    if (!track.seen) continue;
-    if (!object.appeared && track.life.appeared()) {
+    if (!track.seen) {
+      track.went_out |= track.motion.goes_out();
+      continue;
+    }
+    if (!object.appeared && frame.time - begun_ >= nanoseconds(options_.settle_seconds) &&
+        track.life.appeared()) {
       object.appeared = true;
       add(Kind::appeared, object);
     }
@@ -282,7 +287,7 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
     if (track.life.came_by_itself()) {
       track.stopped = true;
       add(Kind::stopped, object);
-    } else if (carrier_went(track)) {
+    } else if (track.life.was_left()) {
       track.left = true;
       add(Kind::left_behind, object);
     }
@@ -293,7 +298,9 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
         track.hidden_since != kNoTime && frame.time - track.hidden_since > nanoseconds(kHidden);
     if (!track.object.appeared) return frame.time - track.last_seen > waits;
     if (!track.life.gone() && !hidden) return false;
-    add(Kind::gone, track.object);
+    Object gone = track.object;
+    gone.box = track.life.last_whole();
+    add(Kind::gone, gone);
     return true;
   });
 }
@@ -301,11 +308,11 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
 void ObjectTracker::tell_of_removals(const ObjectFrame& frame) {
   using Kind = ObjectEvent::Kind;
   for (const RemovedPlace& place : frame.removed)
-    if (place.stood_seconds >= options_.stop_seconds)
-      removals_.add(place, frame.time, height_ / 30.0);
+    if (place.stood_seconds >= options_.removed_seconds)
+      removals_.add(place, frame.time, height_ / 4.0);
   ObjectBox box;
   while (removals_.take(frame.time, &box)) {
-    if (box.longer() < options_.min_size * height_) continue;
+    if (box.longer() < std::max(kLeastRemoved, options_.min_size) * height_) continue;
     // Where it was, the mask may have had a region that never moved.
     const auto its = std::find_if(tracks_.begin(), tracks_.end(), [&](const Track& track) {
       return !track.life.came_by_itself() && overlap(track.object.box, box) > kInside;
@@ -343,17 +350,18 @@ const std::vector<ObjectEvent>& ObjectTracker::push(const ObjectFrame& frame) {
   events_.clear();
   const int64_t step = time_ == kNoTime ? 0 : std::max<int64_t>(1, frame.time - time_);
   time_ = frame.time;
+  if (begun_ == kNoTime) begun_ = frame.time;
   // The shortest of the last steps: frames may be missing.
   frame_ = frame_ == 0 || step < frame_ ? step : frame_ + (step - frame_) / 16;
   const double seconds = std::max(1e-3, static_cast<double>(step) / kSecond);
   boxes_.clear();
-  double all = 0;
+  bool flood = false;
   for (const Region& region : frame.regions) {
     boxes_.push_back(box_of(region));
-    all += region.area;
+    flood |= is_flood(region);
   }
   objects_.clear();
-  if (all > kMostOfPicture * width_ * height_) {
+  if (flood) {
     // Nobody is gone because of it.
     for (Track& track : tracks_) {
       track.last_seen += step;

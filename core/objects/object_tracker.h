@@ -8,6 +8,7 @@
 #include "core/objects/assignment.h"
 #include "core/objects/object.h"
 #include "core/objects/object_life.h"
+#include "core/objects/object_motion.h"
 #include "core/objects/removals.h"
 
 namespace qdmd {
@@ -34,7 +35,7 @@ struct ObjectFrame {
 //  - A piece that is left where a thing no longer is, is a new thing with a number of its own; the
 //    thing that goes on keeps its number.
 //  - Two of which one had not appeared yet are one where they meet.
-//  - Most of the picture is foreground: the frame says nothing.
+//  - A region larger than a third of the picture is no thing: it says nothing.
 class ObjectTracker {
  public:
   ObjectTracker() = default;
@@ -64,12 +65,13 @@ class ObjectTracker {
   struct Track {
     Object object;
     ObjectLife life;
+    ObjectMotion motion;
     ObjectBox expected;                  // in this frame
     int region = -1;                     // that shows it in this frame; -1: none
     bool seen = false;                   // in this frame
     int64_t last_seen = 0;               // the frame's time
     int64_t hidden_since = kNoTime;      // in a region with room for another one alone
-    int carrier = 0;                     // what was beside it when it came, its number; 0: nobody
+    bool went_out = false;               // over the edge of the picture
     bool stopped = false, left = false;  // told
   };
 
@@ -80,11 +82,12 @@ class ObjectTracker {
   void begin_tracks(const ObjectFrame& frame);
   void measure(const ObjectFrame& frame, double seconds);
   void measure_together(const std::vector<size_t>& tracks, const ObjectBox& region, double seconds);
-  void drop_doubles();
+  void find_hidden(int64_t time, const std::vector<std::vector<size_t>>& shown);
   void tell(const ObjectFrame& frame);
   void tell_of_removals(const ObjectFrame& frame);
   void tell_of_motion(int64_t time);
-  bool carrier_went(const Track& track) const;
+  bool is_flood(const Region& region) const;
+  bool is_alone(const Track& track) const;
   void add(ObjectEvent::Kind kind, const Object& object, bool cut_off = false);
 
   ObjectOptions options_;
@@ -98,7 +101,7 @@ class ObjectTracker {
   std::vector<double> cost_;
   std::vector<ObjectBox> boxes_;  // of the frame's regions
   std::vector<int> owner_;        // of each region: a track, or -1
-  int64_t time_ = kNoTime, frame_ = 0, moved_ = kNoTime;
+  int64_t time_ = kNoTime, frame_ = 0, moved_ = kNoTime, begun_ = kNoTime;
   bool in_motion_ = false;
 };
 

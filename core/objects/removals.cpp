@@ -1,23 +1,36 @@
 #include "core/objects/removals.h"
 
-#include <cstddef>
-
 namespace qdmd {
+namespace {
+
+// What grows by less does not grow.
+constexpr double kGrown = 1.05;
+
+}  // namespace
 
 void Removals::add(const RemovedPlace& place, int64_t time, double reach) {
   for (Removal& removal : of_) {
-    if (shared(removal.box.wider(reach), place.box) == 0) continue;
-    removal = {both(removal.box, place.box), time};
+    const ObjectBox room = removal.told ? removal.box : removal.box.wider(reach);
+    if (shared(room, place.box) == 0) continue;
+    if (removal.told) return;
+    const ObjectBox all = both(removal.box, place.box);
+    if (all.area() > kGrown * removal.box.area()) removal.newest = time;
+    removal.box = all;
+    removal.area += place.box.area();
     return;
   }
-  of_.push_back({place.box, time});
+  of_.push_back({place.box, place.box.area(), time});
 }
 
 bool Removals::take(int64_t time, ObjectBox* box) {
-  for (size_t i = 0; i < of_.size(); ++i) {
-    if (static_cast<double>(time - of_[i].newest) < kSettles * kSecond) continue;
-    *box = of_[i].box;
-    of_.erase(of_.begin() + static_cast<std::ptrdiff_t>(i));
+  std::erase_if(of_, [&](const Removal& removal) {
+    return static_cast<double>(time - removal.newest) > kLatePieces * kSecond;
+  });
+  for (Removal& removal : of_) {
+    if (removal.told || static_cast<double>(time - removal.newest) < kSettles * kSecond) continue;
+    removal.told = true;
+    if (removal.area < kFills * removal.box.area()) continue;
+    *box = removal.box;
     return true;
   }
   return false;

@@ -14,10 +14,11 @@ struct RemovedPlace {
 };
 
 // Places are found piece by piece. What is uncovered next to another piece, not long after it, is
-// of the same thing; it is told once nothing more was found for kSettles seconds.
+// of the same thing; it is told once it has not grown for kSettles seconds. Pieces that are found
+// there within kLatePieces seconds more say nothing new.
 class Removals {
  public:
-  static constexpr double kSettles = 0.4;
+  static constexpr double kSettles = 1, kLatePieces = 10, kFills = 0.4;
 
   void forget() { of_.clear(); }
   void add(const RemovedPlace& place, int64_t time, double reach);
@@ -27,7 +28,9 @@ class Removals {
  private:
   struct Removal {
     ObjectBox box;
-    int64_t newest;
+    double area;     // of the pieces
+    int64_t newest;  // when it grew last
+    bool told = false;
   };
   std::vector<Removal> of_;
 };

@@ -29,6 +29,7 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
     bool appeared = false, stopped = false, left = false, over = false, known = true;
   };
   std::map<int64_t, Thing> things;
+  std::map<int64_t, ObjectBox> taken;
   std::vector<TimedEvent> events;
   const auto frame_time = static_cast<int64_t>(kSecond / scene.rate);
   int64_t moved = kNoTime;
@@ -38,12 +39,25 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
     const int64_t time = time_of(scene, k);
     const auto& truth = scene.frames[k].truth;
     for (const NumberedBox& one : truth) {
-      const auto [at, fresh] = things.try_emplace(one.id, Thing{{options, scene.height}, {}});
+      const auto [at, fresh] =
+          things.try_emplace(one.id, Thing{{options, scene.width, scene.height}, {}});
       // What begins to move where it belonged to the background was removed from there.
       if (fresh && k > 0 && one.box.x > 0 && one.box.right() < scene.width &&
           one.box.width > scene.width / 5)
-        events.push_back({Kind::removed, one.id, frame, one.box});
+        taken[one.id] = one.box;
       at->second.box = one.box;
+    }
+    // It is known to be taken a second after nothing of it is left there.
+    for (auto at = taken.begin(); at != taken.end();) {
+      const auto its = std::find_if(truth.begin(), truth.end(),
+                                    [&](const NumberedBox& one) { return one.id == at->first; });
+      if (its != truth.end() && shared(its->box, at->second) > 0) {
+        ++at;
+        continue;
+      }
+      events.push_back({Kind::removed, at->first,
+                        frame + static_cast<int>(Removals::kSettles * scene.rate), at->second});
+      at = taken.erase(at);
     }
     bool moves = false;
     for (auto& [id, thing] : things) {
@@ -51,22 +65,28 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
       const auto its = std::find_if(truth.begin(), truth.end(),
                                     [&](const NumberedBox& one) { return one.id == id; });
       const bool stood = thing.life.standing_since() != kNoTime;
-      thing.life.follow(its == truth.end() ? nullptr : &its->box, time, frame_time);
+      const bool seen = its != truth.end();
+      const ObjectBox around = seen ? its->box.wider(its->box.longer() / 2) : ObjectBox();
+      const bool alone = std::none_of(truth.begin(), truth.end(), [&](const NumberedBox& one) {
+        return one.id != id && things.at(one.id).life.moves() && shared(one.box, around) > 0;
+      });
+      thing.life.follow(seen ? &its->box : nullptr, alone, time, frame_time);
       const bool stands = thing.life.standing_since() != kNoTime;
-      const auto tell = [&](Kind kind) { events.push_back({kind, id, frame, thing.box}); };
-      if (!thing.appeared && thing.life.appeared()) thing.appeared = true, tell(Kind::appeared);
+      const auto tell = [&](Kind kind) {
+        events.push_back(
+            {kind, id, frame, kind == Kind::gone ? thing.life.last_whole() : thing.box});
+      };
+      if (!thing.appeared && frame >= options.settle_seconds * scene.rate && seen &&
+          thing.life.appeared())
+        thing.appeared = true, tell(Kind::appeared);
       if (!thing.appeared) continue;
-      if (its != truth.end()) moves |= thing.life.moves();
+      if (seen) moves |= thing.life.moves();
       if (stood && !stands && (thing.stopped || thing.left))
         thing.stopped = thing.left = false, tell(Kind::moved_on);
       if (stands && !thing.stopped && !thing.left) {
-        const ObjectBox around = thing.box.wider(thing.box.longer() / 2);
-        const bool alone = std::none_of(truth.begin(), truth.end(), [&](const NumberedBox& one) {
-          return one.id != id && things.at(one.id).life.moves() && shared(one.box, around) > 0;
-        });
         if (thing.life.came_by_itself())
           thing.stopped = true, tell(Kind::stopped);
-        else if (alone)
+        else if (thing.life.was_left())
           thing.left = true, tell(Kind::left_behind);
       }
       if (thing.life.gone()) thing.over = true, tell(Kind::gone);
