@@ -137,14 +137,33 @@ void LeavingFrame::write(Output output, const Levels& levels, const MutableImage
     }
     if (masked && wishes().mask_softness > 0) soften(&task);
     return_to_camera(&task, output == Output::background || output == Output::foreground);
-    const Band& band = frames().band();
-    const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
-    const int steps = (height + together - 1) / together;
-    const auto write = [&](int first, int count) {
-      const int row = first * together;
-      write_picture(task, levels, out, top + row, std::min(count * together, height - row));
-    };
-    for_rows(pool(), steps, frames().window().pixels(), write);
+    write(task, levels, out);
+  });
+}
+
+void LeavingFrame::write(const OutputTask& task, const Levels& levels,
+                         const MutableImageView& out) {
+  const Band& band = frames().band();
+  const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
+  const int steps = (height + together - 1) / together;
+  const auto write = [&](int first, int count) {
+    const int row = first * together;
+    write_picture(task, levels, out, top + row, std::min(count * together, height - row));
+  };
+  for_rows(pool(), steps, frames().window().pixels(), write);
+}
+
+void LeavingFrame::write_frame(const Levels& levels, const MutableImageView& out) {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::cutout);
+    read();
+    // All of it is cut out.
+    everything_.resize(frames().window().pixels(), 255);
+    if (!pose().is_rest() && !wishes().stabilize_output)
+      for (int c = 0; c < kChannels; ++c) task.x[c] = frames().untouched(slot(), c);
+    task.mask = everything_.data();
+    write(task, levels, out);
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/engine/schedule.h"
 #include "core/foreground/picture.h"
@@ -31,6 +32,8 @@ class LeavingFrame {
   // Gives the mask, as in Output::mask, and the lengths of the residuals in levels, at most 255;
   // width * height samples each.
   void foreground(uint8_t* mask, uint8_t* residual);
+  // Writes the frame as it came (on the canvas, if pictures are steady), like write().
+  void write_frame(const Levels& levels, const MutableImageView& out);
   // Where the camera looked.
   Pose pose() const;
   // The next place, each once, where this frame and those before it show that something has left
@@ -58,6 +61,7 @@ class LeavingFrame {
   void read();
   void decide(OutputTask* task);
   void soften(OutputTask* task);
+  void write(const OutputTask& task, const Levels& levels, const MutableImageView& out);
   void return_to_camera(OutputTask* task, bool level);
   FrameStore& frames() const { return *stage_.frames; }
   const Wishes& wishes() const { return stage_.background->wishes(); }
@@ -69,6 +73,7 @@ class LeavingFrame {
   Levels levels_;
   std::unique_ptr<SoftMask> soft_mask_;
   Done done_;
+  std::vector<uint8_t> everything_;  // a mask that is set everywhere, once somebody wants a frame
   // The planes. Where pixels share samples, `room_` has those of each pixel.
   PlaneRows planes_;
   std::unique_ptr<uint8_t[]> room_;

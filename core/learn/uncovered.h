@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 
 namespace qdmd {
 
@@ -23,12 +24,12 @@ class UncoveredPlaces {
   static constexpr size_t kMost = 64;
 
   void forget() { size_ = 0; }
-  // One that is there already, as its look came within `at_once` frames and its box overlaps, is
-  // not added again. The oldest makes room for a new one.
+  // One that is inside of another whose look came within `at_once` frames of its own is not added.
+  // The oldest makes room for a new one.
   void add(const UncoveredPlace& place, int64_t at_once) {
     for (size_t i = 0; i < size_; ++i)
       if (std::abs(places_[i].place.since - place.since) <= at_once &&
-          overlap(places_[i].place, place))
+          is_in(place, places_[i].place))
         return;
     if (size_ == kMost) erase(0);
     places_[size_++] = {place, false};
@@ -50,9 +51,9 @@ class UncoveredPlaces {
     UncoveredPlace place;
     bool taken;
   };
-  static bool overlap(const UncoveredPlace& a, const UncoveredPlace& b) {
-    return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height &&
-           b.y < a.y + a.height;
+  static bool is_in(const UncoveredPlace& a, const UncoveredPlace& b) {
+    return a.x >= b.x && a.y >= b.y && a.x + a.width <= b.x + b.width &&
+           a.y + a.height <= b.y + b.height;
   }
   void erase(size_t index) {
     std::move(places_.begin() + static_cast<std::ptrdiff_t>(index) + 1,

@@ -54,9 +54,8 @@ struct Object {
   int64_t first_time = 0;            // of the first frame that showed it
   int64_t first_stamp = 0;           // what the caller said of that frame (ObjectFrame::stamp)
   int64_t standing_since = kNoTime;  // kNoTime: it moves
-  int64_t standing_stamp = 0;
-  bool appeared = false;       // it was told of
-  bool shares_region = false;  // with others: its box is an estimate
+  bool appeared = false;             // it was told of
+  bool shares_region = false;        // with others: its box is an estimate
 };
 
 struct ObjectEvent {

@@ -67,34 +67,35 @@ void ObjectLife::judge_standing(int64_t time, int64_t stop) {
   stood_at_ = places_.back();
 }
 
-void ObjectLife::follow(const ObjectBox* box, bool alone, int64_t time, int64_t frame) {
+void ObjectLife::miss(int64_t time, int64_t frame) {
   ++frames_;
-  if (!box) {
-    gone_ = first_ && time - last_ >= time_of(options_->gone_seconds, frame);
-    return;
-  }
+  gone_ = first_ && time - last_ >= time_of(options_->gone_seconds, frame);
+}
+
+void ObjectLife::follow(const Sight& sight, int64_t time, int64_t frame) {
+  ++frames_;
   ++seen_;
-  box_ = *box;
+  box_ = sight.box;
   last_ = time;
-  if (alone && alone_since_ == kNoTime) alone_since_ = time;
-  longest_ = std::max(longest_, box->longer());
+  if (sight.alone && alone_since_ == kNoTime) alone_since_ = time;
+  longest_ = std::max(longest_, box_.longer());
   if (!first_) {
-    first_ = {time, *box};
-    before_ = *box;
+    first_ = {time, sight.region};
+    before_ = box_;
   }
   // Boxes tremble: that is no way.
   if (const double step = distance(box_, before_); step > 2 * kPixels) {
     way_ += step;
-    before_ = *box;
+    before_ = box_;
   }
   const int64_t stop = time_of(options_->stop_seconds, frame);
-  places_.push_back({time, *box});
+  places_.push_back({time, box_});
   // One that is older than `stop` stays, from which on it may have stood.
   while (places_.size() > 2 && time - places_[1].time >= stop) places_.pop_front();
   double largest = 0;
   for (const Place& place : places_) largest = std::max(largest, place.box.area());
-  if (2 * box->area() >= largest) last_whole_ = *box;
-  const double gone = way(first_->box, *box);
+  if (2 * box_.area() >= largest) last_whole_ = box_;
+  const double gone = way(first_->box, sight.region);
   came_ |= gone >= box_.longer() / 2;
   judge_standing(time, stop);
   was_left_ = stands_ && !came_ && alone_since_ != kNoTime && time - alone_since_ >= stop;

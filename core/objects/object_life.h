@@ -27,10 +27,18 @@ class ObjectLife {
   ObjectLife(const ObjectOptions& options, int picture_width, int picture_height)
       : options_(&options), width_(picture_width), height_(picture_height) {}
 
-  // A frame showed it, or did not (null). alone: nothing that moves is beside it; what stands where
-  // it was put down is seen for itself from the first time on that it is alone. time: of the frame,
-  // later than that of the one before. frame: nanoseconds that frames last.
-  void follow(const ObjectBox* box, bool alone, int64_t time, int64_t frame);
+  // How a frame shows it.
+  struct Sight {
+    ObjectBox box;     // its own
+    ObjectBox region;  // the whole of what shows it
+    // Nothing that moves is beside it. What stands where it was put down is seen for itself from
+    // the first time on that it is alone.
+    bool alone;
+  };
+  // A frame showed it, or did not. time: of the frame, later than that of the one before. frame:
+  // nanoseconds that frames last.
+  void follow(const Sight& sight, int64_t time, int64_t frame);
+  void miss(int64_t time, int64_t frame);
   // Frames of so many nanoseconds said nothing.
   void wait(int64_t time) { last_ += time; }
 
@@ -60,8 +68,8 @@ class ObjectLife {
   const ObjectOptions* options_;
   int width_, height_;
   ObjectBox box_, last_whole_, before_;
-  std::deque<Place> places_;  // of the last stop_seconds
-  std::optional<Place> first_, stood_at_;
+  std::deque<Place> places_;               // of the last stop_seconds
+  std::optional<Place> first_, stood_at_;  // first_: a region
   double longest_ = 0, way_ = 0;
   int64_t last_ = 0, standing_since_ = kNoTime, alone_since_ = kNoTime;
   int frames_ = 0, seen_ = 0;

@@ -8,9 +8,11 @@ namespace {
 
 // Pairs that are worse are none: 1 - overlap, and half the distance of the middles in units of the
 // longer side.
-constexpr double kMostCost = 1.45, kOfDistance = 0.5, kNoPair = 1e6;
+constexpr double kMostCost = 1.45, kOfDistance = 0.5, kNoPair = 1e6, kYoung = 0.2;
 // A thing is in a region, or a region in a thing, with so large a share of its pixels.
 constexpr double kInside = 0.5;
+// A region that is so much smaller than a thing is a piece.
+constexpr double kPiece = 0.35;
 // A thing may look so many times as large, with all its pieces, as before.
 constexpr double kGrows = 1.3;
 // Seconds that an unseen thing goes on as it went; that which has not appeared waits for so long.
@@ -71,12 +73,21 @@ void ObjectTracker::assign(const ObjectFrame& frame) {
   const size_t regions = frame.regions.size();
   owner_.assign(regions, -1);
   cost_.resize(tracks_.size() * regions);
-  for (size_t t = 0; t < tracks_.size(); ++t)
-    for (size_t r = 0; r < regions; ++r)
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    const Track& track = tracks_[t];
+    const ObjectBox& at = track.expected;
+    const auto shows = [&](const ObjectBox& box) { return shared(box, at) > kInside * at.area(); };
+    const bool shown = std::any_of(boxes_.begin(), boxes_.end(), shows);
+    for (size_t r = 0; r < regions; ++r) {
+      double& cost = cost_[t * regions + r];
+      cost = cost_of(at, boxes_[r]);
+      // A piece of what another region shows.
+      const bool piece = shown && boxes_[r].area() < kPiece * at.area();
+      if (track.went_out || piece) cost = kNoPair;
       // Of two, the one that is known for longer.
-      cost_[t * regions + r] = tracks_[t].went_out ? kNoPair
-                                                   : cost_of(tracks_[t].expected, boxes_[r]) +
-                                                         (tracks_[t].object.appeared ? 0 : 0.2);
+      if (!track.object.appeared) cost += kYoung;
+    }
+  }
   const std::vector<int>& pairs = assignment_.solve(cost_, tracks_.size(), regions);
   for (size_t t = 0; t < tracks_.size(); ++t) {
     if (pairs[t] < 0 || cost_[t * regions + static_cast<size_t>(pairs[t])] >= kNoPair) continue;
@@ -264,8 +275,10 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
   for (Track& track : tracks_) {
     Object& object = track.object;
     const ObjectBox box = track.motion.box();
-    track.life.follow(track.seen ? &box : nullptr, track.seen && is_alone(track), frame.time,
-                      frame_);
+    if (track.seen)
+      track.life.follow({box, object.box, is_alone(track)}, frame.time, frame_);
+    else
+      track.life.miss(frame.time, frame_);
     const bool stood = object.standing_since != kNoTime;
     object.standing_since = track.life.standing_since();
     if (!track.seen) {
@@ -273,7 +286,7 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
       continue;
     }
     if (!object.appeared && frame.time - begun_ >= nanoseconds(options_.settle_seconds) &&
-        track.life.appeared()) {
+        track.life.appeared() && !removals_.covers(object.box, frame.time)) {
       object.appeared = true;
       add(Kind::appeared, object);
     }
@@ -366,6 +379,14 @@ const std::vector<ObjectEvent>& ObjectTracker::push(const ObjectFrame& frame) {
     for (Track& track : tracks_) {
       track.last_seen += step;
       track.life.wait(step);
+    }
+    for (size_t r = 0; r < frame.regions.size(); ++r) {
+      Object& object = objects_.emplace_back();
+      object.box = boxes_[r];
+      object.area = frame.regions[r].area;
+      object.mean_residual = frame.regions[r].mean_residual;
+      object.first_time = frame.time;
+      object.first_stamp = frame.stamp;
     }
     return events_;
   }

@@ -54,7 +54,8 @@ class ObjectTracker {
   // Holds from the next frame on.
   void set_options(const ObjectOptions& options) { options_ = options; }
 
-  // What the newest frame shows, each region once or, where things share it, once for each.
+  // What the newest frame shows: each region once, with its pieces, or, where things share it, once
+  // for each. Where a region is too large for a thing, all of the frame's, with number 0.
   const std::vector<Object>& objects() const { return objects_; }
   // True between motion_begins and motion_ends.
   bool any_motion() const { return in_motion_; }

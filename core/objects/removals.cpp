@@ -22,6 +22,13 @@ void Removals::add(const RemovedPlace& place, int64_t time, double reach) {
   of_.push_back({place.box, place.box.area(), time});
 }
 
+bool Removals::covers(const ObjectBox& box, int64_t time) const {
+  return std::any_of(of_.begin(), of_.end(), [&](const Removal& removal) {
+    return static_cast<double>(time - removal.newest) < kRests * kSecond &&
+           2 * shared(removal.box.wider(removal.box.longer() / 4), box) > box.area();
+  });
+}
+
 bool Removals::take(int64_t time, ObjectBox* box) {
   std::erase_if(of_, [&](const Removal& removal) {
     return static_cast<double>(time - removal.newest) > kLatePieces * kSecond;

@@ -15,13 +15,16 @@ struct RemovedPlace {
 
 // Places are found piece by piece. What is uncovered next to another piece, not long after it, is
 // of the same thing; it is told once it has not grown for kSettles seconds. Pieces that are found
-// there within kLatePieces seconds more say nothing new.
+// there within kLatePieces seconds more say nothing new. Regions there are
+// rests of it, until kRests seconds after it grew last.
 class Removals {
  public:
-  static constexpr double kSettles = 1, kLatePieces = 10, kFills = 0.4;
+  static constexpr double kSettles = 0.7, kLatePieces = 10, kFills = 0.3, kRests = 2;
 
   void forget() { of_.clear(); }
   void add(const RemovedPlace& place, int64_t time, double reach);
+  // Half of a box is where something is being uncovered: it is a rest of that.
+  bool covers(const ObjectBox& box, int64_t time) const;
   // The next that is complete at that time: its box. False: there is none.
   bool take(int64_t time, ObjectBox* box);
 

@@ -56,7 +56,7 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
         continue;
       }
       events.push_back({Kind::removed, at->first,
-                        frame + static_cast<int>(Removals::kSettles * scene.rate), at->second});
+                        frame + static_cast<int>(scene.rate), at->second});
       at = taken.erase(at);
     }
     bool moves = false;
@@ -70,7 +70,10 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
       const bool alone = std::none_of(truth.begin(), truth.end(), [&](const NumberedBox& one) {
         return one.id != id && things.at(one.id).life.moves() && shared(one.box, around) > 0;
       });
-      thing.life.follow(seen ? &its->box : nullptr, alone, time, frame_time);
+      if (seen)
+        thing.life.follow({its->box, its->box, alone}, time, frame_time);
+      else
+        thing.life.miss(time, frame_time);
       const bool stands = thing.life.standing_since() != kNoTime;
       const auto tell = [&](Kind kind) {
         events.push_back(
