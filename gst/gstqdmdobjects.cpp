@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "gst/gstqdmdenums.h"
 #include "gst/videoview.h"
@@ -81,6 +82,7 @@ void ObjectWatch::begin(const GstVideoInfo& info) {
   info_ = info;
   any_ = false;
   events_.clear();
+  shown_.clear();
   frame_.reset();
 }
 
@@ -89,6 +91,7 @@ void ObjectWatch::close() {
   residual_ = {};
   finder_ = {};
   events_ = {};
+  shown_ = {};
   frame_.reset();
   any_ = false;
 }
@@ -135,6 +138,12 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
          double(place.stood) * double(step_of(info_)) / double(GST_SECOND)});
   const gint64 stamp = GST_CLOCK_TIME_IS_VALID(now_.stream) ? gint64(now_.stream) : -1;
   const auto& events = tracker_.push({regions, removed_, now_.clock, stamp});
+  shown_.clear();
+  for (const Object& object : tracker_.objects())
+    if (attaches_ && object.area >= least_area_) shown_.push_back(&object);
+  std::sort(shown_.begin(), shown_.end(), [](const Object* a, const Object* b) {
+    return a->area > b->area || (a->area == b->area && a->id < b->id);
+  });
   if (!tells_) return;
   events_.insert(events_.end(), events.begin(), events.end());
   const bool pictured = std::any_of(events.begin(), events.end(), [](const ObjectEvent& event) {
@@ -148,13 +157,7 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
 }
 
 void ObjectWatch::attach(GstBuffer* buffer) const {
-  if (!attaches_) return;
-  std::vector<const Object*> shown;
-  for (const Object& object : tracker_.objects())
-    if (object.area >= least_area_) shown.push_back(&object);
-  std::stable_sort(shown.begin(), shown.end(),
-                   [](const Object* a, const Object* b) { return a->area > b->area; });
-  for (const Object* object : shown) {
+  for (const Object* object : shown_) {
     const Pixels box(object->box);
     auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", box.x, box.y,
                                                               box.width, box.height);
@@ -181,6 +184,9 @@ GstSample* ObjectWatch::snapshot_of(const ObjectBox& box, const GstVideoInfo& in
   const guint w = std::min(at.width, width - x), h = std::min(at.height, height - y);
   GstVideoInfo cut;
   if (!gst_video_info_set_format(&cut, GST_VIDEO_INFO_FORMAT(&info), w, h)) return nullptr;
+  // Converters of frames want one rate.
+  cut.fps_n = info.fps_n;
+  cut.fps_d = info.fps_d;
   cut.colorimetry = info.colorimetry;
   cut.chroma_site = info.chroma_site;
   BufferPtr buffer(gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&cut), nullptr));
@@ -241,9 +247,15 @@ void ObjectWatch::tell(GstElement* element, const GstVideoInfo& info) {
 void ObjectWatch::cut_off(GstElement* element) {
   if (!any_) return;
   any_ = false;
-  const std::vector<ObjectEvent>& events = tracker_.end();
-  if (tells_) events_.insert(events_.end(), events.begin(), events.end());
+  shown_.clear();
   frame_.reset();
+  try {
+    const std::vector<ObjectEvent>& events = tracker_.end();
+    if (tells_) events_.insert(events_.end(), events.begin(), events.end());
+  } catch (const std::bad_alloc&) {
+    // Nobody is told; what comes is new.
+    tracker_.begin(GST_VIDEO_INFO_WIDTH(&info_), GST_VIDEO_INFO_HEIGHT(&info_), {});
+  }
   tell(element, info_);
 }
 

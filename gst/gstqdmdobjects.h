@@ -51,8 +51,9 @@ class ObjectWatch {
   RegionFinder finder_;
   ObjectTracker tracker_;
   std::vector<RemovedPlace> removed_;
-  std::vector<ObjectEvent> events_;  // that wait for tell()
-  BufferPtr frame_;                  // that the events are of, where somebody wants snapshots
+  std::vector<ObjectEvent> events_;   // that wait for tell()
+  BufferPtr frame_;                   // that the events are of, where somebody wants snapshots
+  std::vector<const Object*> shown_;  // the regions to attach, the largest first
   Times now_;
   bool any_ = false, tells_ = false, attaches_ = false;
   int least_area_ = 0;  // of regions that are attached

@@ -324,7 +324,13 @@ void ObjectTracker::tell_of_removals(const ObjectFrame& frame) {
     if (place.stood_seconds >= options_.removed_seconds)
       removals_.add(place, frame.time, height_ / 4.0);
   ObjectBox box;
-  while (removals_.take(frame.time, &box)) {
+  // Where what was uncovered is foreground again, it was not the background.
+  const auto is_free = [&](const ObjectBox& place) {
+    double covered = 0;
+    for (const ObjectBox& region : boxes_) covered += shared(region, place);
+    return covered < kInside * place.area();
+  };
+  while (removals_.take(frame.time, is_free, &box)) {
     if (box.longer() < std::max(kLeastRemoved, options_.min_size) * height_) continue;
     // Where it was, the mask may have had a region that never moved.
     const auto its = std::find_if(tracks_.begin(), tracks_.end(), [&](const Track& track) {

@@ -29,12 +29,14 @@ bool Removals::covers(const ObjectBox& box, int64_t time) const {
   });
 }
 
-bool Removals::take(int64_t time, ObjectBox* box) {
+bool Removals::take(int64_t time, const std::function<bool(const ObjectBox&)>& is_free,
+                    ObjectBox* box) {
   std::erase_if(of_, [&](const Removal& removal) {
     return static_cast<double>(time - removal.newest) > kLatePieces * kSecond;
   });
   for (Removal& removal : of_) {
     if (removal.told || static_cast<double>(time - removal.newest) < kSettles * kSecond) continue;
+    if (!is_free(removal.box)) continue;
     removal.told = true;
     if (removal.area < kFills * removal.box.area()) continue;
     *box = removal.box;

@@ -1,6 +1,7 @@
 // What was taken away from the background, gathered from the places that were uncovered.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "core/objects/object.h"
@@ -25,8 +26,8 @@ class Removals {
   void add(const RemovedPlace& place, int64_t time, double reach);
   // Half of a box is where something is being uncovered: it is a rest of that.
   bool covers(const ObjectBox& box, int64_t time) const;
-  // The next that is complete at that time: its box. False: there is none.
-  bool take(int64_t time, ObjectBox* box);
+  // The next that is complete at that time, and whose place is free: its box. False: there is none.
+  bool take(int64_t time, const std::function<bool(const ObjectBox&)>& is_free, ObjectBox* box);
 
  private:
   struct Removal {
