@@ -311,6 +311,7 @@ void ObjectTracker::tell(const ObjectFrame& frame) {
         track.hidden_since != kNoTime && frame.time - track.hidden_since > nanoseconds(kHidden);
     if (!track.object.appeared) return frame.time - track.last_seen > waits;
     if (!track.life.gone() && !hidden) return false;
+    moved_ = std::max(moved_, last_motion(track));
     Object gone = track.object;
     gone.box = track.life.last_whole();
     add(Kind::gone, gone);
@@ -352,17 +353,22 @@ void ObjectTracker::tell_of_removals(const ObjectFrame& frame) {
 
 void ObjectTracker::tell_of_motion(int64_t time) {
   using Kind = ObjectEvent::Kind;
-  const bool moves = std::any_of(tracks_.begin(), tracks_.end(), [](const Track& track) {
-    return track.object.appeared && track.seen && track.life.moves();
-  });
-  if (moves) moved_ = time;
-  if (moves && !in_motion_) {
+  int64_t newest = moved_;
+  for (const Track& track : tracks_)
+    if (track.object.appeared) newest = std::max(newest, last_motion(track));
+  if (newest == time && !in_motion_) {
     in_motion_ = true;
     add(Kind::motion_begins, {});
   }
-  if (!in_motion_ || time - moved_ < nanoseconds(options_.grace_seconds)) return;
+  if (!in_motion_ || time - newest < nanoseconds(options_.grace_seconds)) return;
   in_motion_ = false;
   add(Kind::motion_ends, {});
+}
+
+// What stands has moved until it stood.
+int64_t ObjectTracker::last_motion(const Track& track) const {
+  const int64_t since = track.life.standing_since();
+  return since == kNoTime ? track.last_seen : since;
 }
 
 const std::vector<ObjectEvent>& ObjectTracker::push(const ObjectFrame& frame) {

@@ -87,6 +87,7 @@ class ObjectTracker {
   void tell(const ObjectFrame& frame);
   void tell_of_removals(const ObjectFrame& frame);
   void tell_of_motion(int64_t time);
+  int64_t last_motion(const Track& track) const;
   bool is_flood(const Region& region) const;
   bool is_alone(const Track& track) const;
   void add(ObjectEvent::Kind kind, const Object& object, bool cut_off = false);
@@ -102,7 +103,8 @@ class ObjectTracker {
   std::vector<double> cost_;
   std::vector<ObjectBox> boxes_;  // of the frame's regions
   std::vector<int> owner_;        // of each region: a track, or -1
-  int64_t time_ = kNoTime, frame_ = 0, moved_ = kNoTime, begun_ = kNoTime;
+  int64_t time_ = kNoTime, frame_ = 0, begun_ = kNoTime;
+  int64_t moved_ = kNoTime;  // the last motion of what is gone
   bool in_motion_ = false;
 };
 

@@ -26,6 +26,7 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
   struct Thing {
     ObjectLife life;
     ObjectBox box;
+    int64_t seen = 0;
     bool appeared = false, stopped = false, left = false, over = false, known = true;
   };
   std::map<int64_t, Thing> things;
@@ -55,8 +56,8 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
         ++at;
         continue;
       }
-      events.push_back({Kind::removed, at->first,
-                        frame + static_cast<int>(scene.rate), at->second});
+      events.push_back(
+          {Kind::removed, at->first, frame + static_cast<int>(scene.rate), at->second});
       at = taken.erase(at);
     }
     bool moves = false;
@@ -82,6 +83,7 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
       if (!thing.appeared && frame >= options.settle_seconds * scene.rate && seen &&
           thing.life.appeared())
         thing.appeared = true, tell(Kind::appeared);
+      if (seen) thing.seen = time;
       if (!thing.appeared) continue;
       if (seen) moves |= thing.life.moves();
       if (stood && !stands && (thing.stopped || thing.left))
@@ -94,7 +96,11 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
       }
       if (thing.life.gone()) thing.over = true, tell(Kind::gone);
     }
-    if (moves) moved = time;
+    moved = kNoTime;
+    for (const auto& [id, thing] : things) {
+      const int64_t since = thing.life.standing_since();
+      if (thing.appeared) moved = std::max(moved, since == kNoTime ? thing.seen : since);
+    }
     const TimedEvent of_all = {Kind::motion_begins, -1, frame, {}};
     if (moves && !in_motion) in_motion = true, events.push_back(of_all);
     if (in_motion && static_cast<double>(time - moved) >= options.grace_seconds * kSecond) {
