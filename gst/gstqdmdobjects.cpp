@@ -122,13 +122,19 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
   least_area_ = wanted > 0 ? wanted : default_least_area(info_);
   tracker_.set_options(options);
   const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  mask_.resize(pixels);
-  residual_.resize(pixels);
-  frame->foreground(mask_.data(), residual_.data());
+  const guint8 *mask = nullptr, *residual = nullptr;
+  if (attaches_) {
+    mask_.resize(pixels);
+    residual_.resize(pixels);
+    frame->foreground(mask_.data(), residual_.data());
+    mask = mask_.data(), residual = residual_.data();
+  } else {
+    // Distances are for regions alone.
+    mask = frame->mask();
+  }
   int least = attaches_ ? least_area_ : G_MAXINT;
   if (tells_) least = std::min(least, ObjectTracker::least_area(height, options));
-  const std::vector<Region>& regions =
-      finder_.find(mask_.data(), residual_.data(), width, height, least, true);
+  const std::vector<Region>& regions = finder_.find(mask, residual, width, height, least, true);
   removed_.clear();
   const Pose pose = settings.wishes.stabilize_output ? Pose() : frame->pose();
   UncoveredPlace place;

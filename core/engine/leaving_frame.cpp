@@ -176,6 +176,16 @@ const uint8_t* LeavingFrame::whole_mask() {
   });
 }
 
+const uint8_t* LeavingFrame::mask() {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  return flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::mask);
+    decide(&task);
+    return_to_camera(&task, false);
+    return task.mask;
+  });
+}
+
 void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
   const Clock::Span span(*stage_.clock, Clock::frames);
   flushed_if_it_throws(this, [&] {

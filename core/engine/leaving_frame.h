@@ -29,7 +29,10 @@ class LeavingFrame {
   // The mask of the whole picture, even if a team shares it: 255 where foreground, else 0,
   // width * height samples in row order. Good until skip().
   const uint8_t* whole_mask();
-  // Gives the mask, as in Output::mask, and the lengths of the residuals in levels, at most 255;
+  // The mask, as in Output::mask but hard: 255 where foreground, else 0, width * height samples in
+  // row order. Good until the next call.
+  const uint8_t* mask();
+  // Gives the same, and the lengths of the residuals in levels, at most 255;
   // width * height samples each.
   void foreground(uint8_t* mask, uint8_t* residual);
   // Writes the frame as it came (on the canvas, if pictures are steady), like write().

@@ -92,7 +92,8 @@ void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* re
   for (int begin = next_of(mask, 0, width, 255), end; begin < width;
        begin = next_of(mask, end, width, 255)) {
     end = next_of(mask, begin, width, 0);
-    const int64_t sum = std::accumulate(residual + begin, residual + end, int64_t{0});
+    const int64_t sum =
+        residual ? std::accumulate(residual + begin, residual + end, int64_t{0}) : 0;
     const Pixels run = {begin, end, y, y + 1, end - begin, sum};
     if (stretches.size() > first && begin - stretches.back().right < reach) {
       stretches.back().add(run);
@@ -129,7 +130,7 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
       2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
   for (int y = 0; y < height; ++y) {
     const size_t first = static_cast<size_t>(y) * static_cast<size_t>(width);
-    memory_->find_stretches(mask + first, residual + first, width, y, reach);
+    memory_->find_stretches(mask + first, residual ? residual + first : nullptr, width, y, reach);
   }
   rows.push_back(stretches.size());
   for (int y = 1; y < height; ++y)

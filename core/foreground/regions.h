@@ -25,10 +25,10 @@ class RegionFinder {
   ~RegionFinder();
 
   // The regions of a picture of width x height pixels, the largest first, until the next call.
-  // mask: 255 where foreground, else 0; residual: levels. Parts nearer to each other than about
-  // 1/60 of the short side are one region, and so are, unless they stay `apart`, regions whose
-  // boxes overlap. Regions of fewer than least_area pixels are left out; 0: 1/2000 of the picture,
-  // at least 4. At most kMostRegions. Throws std::bad_alloc.
+  // mask: 255 where foreground, else 0; residual: levels, or null where nobody asks. Parts nearer
+  // to each other than about 1/60 of the short side are one region, and so are, unless they stay
+  // `apart`, regions whose boxes overlap. Regions of fewer than least_area pixels are left out; 0:
+  // 1/2000 of the picture, at least 4. At most kMostRegions. Throws std::bad_alloc.
   const std::vector<Region>& find(const uint8_t* mask, const uint8_t* residual, int width,
                                   int height, int least_area, bool apart = false);
 
