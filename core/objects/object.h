@@ -82,7 +82,7 @@ struct ObjectOptions {
   // What belonged to the background had been there for so long.
   double removed_seconds = 4;
   // Nothing is told before so much of the stream is known.
-  double settle_seconds = 2;
+  double settle_seconds = 4;
 };
 
 }  // namespace qdmd

@@ -24,13 +24,15 @@ struct Measured {
   double middle, size;
 };
 Measured measure(double low, double high, double end, double expected, double size, double speed,
-                 bool known) {
+                 bool known, bool inside) {
   const double seen = high - low;
   const bool at_low = low <= kAtEdge, at_high = high >= end - kAtEdge;
   if (at_low != at_high) {
-    // It comes in as far as nobody saw it before.
-    const double whole = std::max(size, seen);
-    return {at_low ? high - whole / 2 : low + whole / 2, whole};
+    // It comes in as far as nobody saw it before; else something comes in beside it.
+    const bool other = inside && seen > kLarger * size;
+    const double whole = other ? size : std::max(size, seen);
+    return {at_low ? high - whole / 2 : low + whole / 2,
+            other ? size + kSizeGain * (seen - size) : whole};
   }
   if (!known || seen <= kLarger * size || at_low)
     return {(low + high) / 2, known ? size + kSizeGain * (seen - size) : seen};
@@ -71,10 +73,13 @@ void ObjectMotion::go_on(double seconds) {
 void ObjectMotion::follow(const ObjectBox& region, bool stands, double seconds) {
   const double x = stands ? x_ : x_ + vx_ * seconds, y = stands ? y_ : y_ + vy_ * seconds;
   const bool known = ++frames_ > kKnown;
-  const Measured across = measure(region.x, region.right(), picture_width_, x, width_, vx_, known);
-  const Measured down = measure(region.y, region.bottom(), picture_height_, y, height_, vy_, known);
+  const Measured across =
+      measure(region.x, region.right(), picture_width_, x, width_, vx_, known, was_inside_);
+  const Measured down =
+      measure(region.y, region.bottom(), picture_height_, y, height_, vy_, known, was_inside_);
   vx_ += kVelocityGain * (across.middle - x_ - vx_ * seconds) / seconds;
   vy_ += kVelocityGain * (down.middle - y_ - vy_ * seconds) / seconds;
+  was_inside_ |= region.x > kAtEdge && region.right() < picture_width_ - kAtEdge;
   x_ = across.middle, width_ = across.size;
   y_ = down.middle, height_ = down.size;
 }

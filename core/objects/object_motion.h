@@ -40,6 +40,7 @@ class ObjectMotion {
   double x_, y_, width_, height_;  // its middle and its sides, pixels
   double vx_ = 0, vy_ = 0;         // pixels a second
   int frames_ = 1;
+  bool was_inside_ = false;  // away from the edges of the picture: all of it was seen
 };
 
 }  // namespace qdmd

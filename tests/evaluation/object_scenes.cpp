@@ -40,14 +40,17 @@ ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool l
   options.frame_rate = kRate;
   require(engine.configure(options, kWidth, kHeight));
   RegionFinder finder;
-  std::vector<uint8_t> mask(size_t{kWidth} * kHeight), residual(mask.size());
   size_t next = 0;
   const auto take = [&] {
     while (LeavingFrame* leaving = engine.next()) {
       ObservedFrame& frame = result.frames[next++];
-      leaving->foreground(mask.data(), residual.data());
-      frame.regions = finder.find(mask.data(), residual.data(), kWidth, kHeight,
-                                  ObjectTracker::least_area(kHeight, {}), true);
+      const auto begin = std::chrono::steady_clock::now();
+      const uint8_t* const mask = leaving->mask();
+      result.mask_seconds += seconds_since(begin);
+      const auto middle = std::chrono::steady_clock::now();
+      frame.regions =
+          finder.find(mask, nullptr, kWidth, kHeight, ObjectTracker::least_area(kHeight, {}), true);
+      result.region_seconds += seconds_since(middle);
       UncoveredPlace place;
       while (leaving->next_uncovered(&place))
         frame.removed.push_back(
@@ -65,7 +68,9 @@ ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool l
           {static_cast<int64_t>(scene.owners()[i]),
            {double(box.x), double(box.y), double(box.width), double(box.height)}});
     }
+    const auto begin = std::chrono::steady_clock::now();
     require(engine.push(view_of(scene.frame())));
+    result.mask_seconds += seconds_since(begin);
     take();
   }
   require(engine.drain());

@@ -1,6 +1,7 @@
 // What the masks of simulated scenes show, and what is true of them.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <iosfwd>
 #include <string>
@@ -24,7 +25,12 @@ struct ObservedScene {
   int width = 0, height = 0;
   double rate = 25;
   std::vector<ObservedFrame> frames;
+  double mask_seconds = 0, region_seconds = 0;  // that all frames took
 };
+
+inline double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
 
 // Runs the engine over a scene of 320x240 pixels.
 ObservedScene observe(const std::string& scene, uint64_t seed, int frames, bool live);

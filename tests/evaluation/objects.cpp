@@ -2,6 +2,7 @@
 // docs/objects.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -69,7 +70,9 @@ std::vector<TimedEvent> true_events(const ObservedScene& scene, const ObjectOpti
       const bool seen = its != truth.end();
       const ObjectBox around = seen ? its->box.wider(its->box.longer() / 2) : ObjectBox();
       const bool alone = std::none_of(truth.begin(), truth.end(), [&](const NumberedBox& one) {
-        return one.id != id && things.at(one.id).life.moves() && shared(one.box, around) > 0;
+        const auto other = things.find(one.id);
+        return one.id != id && shared(one.box, around) > 0 &&
+               (other == things.end() || other->second.life.moves());
       });
       if (seen)
         thing.life.follow({its->box, its->box, alone}, time, frame_time);
@@ -145,6 +148,7 @@ struct Row {
   std::map<Kind, EventScores> events;
   TrackingScores ours, plain;
   int64_t frames = 0;
+  double mask_seconds = 0, region_seconds = 0, object_seconds = 0;
 };
 
 void score(const ObservedScene& scene, bool verbose, Row* row) {
@@ -157,8 +161,10 @@ void score(const ObservedScene& scene, bool verbose, Row* row) {
   std::vector<TimedEvent> told;
   for (size_t k = 0; k < scene.frames.size(); ++k) {
     const ObservedFrame& frame = scene.frames[k];
-    for (const ObjectEvent& event :
-         tracker.push({frame.regions, frame.removed, time_of(scene, k), 0}))
+    const auto begin = std::chrono::steady_clock::now();
+    const auto& events = tracker.push({frame.regions, frame.removed, time_of(scene, k), 0});
+    row->object_seconds += seconds_since(begin);
+    for (const ObjectEvent& event : events)
       told.push_back({event.kind, event.object.id, static_cast<int>(k), event.object.box});
     std::vector<NumberedBox> found;
     for (const Object& object : tracker.objects())
@@ -173,6 +179,7 @@ void score(const ObservedScene& scene, bool verbose, Row* row) {
   ours.finish(), plain.finish();
   row->ours.add(ours), row->plain.add(plain);
   row->frames += std::ssize(scene.frames);
+  row->mask_seconds += scene.mask_seconds, row->region_seconds += scene.region_seconds;
   const std::vector<TimedEvent> truth = true_events(scene, options);
   const std::string name = scene.scene + " " + std::to_string(scene.seed);
   for (Kind kind : kKinds)
@@ -212,6 +219,18 @@ void print(const std::map<std::string, Row>& rows) {
                 row.plain.mota(), row.plain.idf1(), static_cast<long long>(row.plain.switches()));
 }
 
+void print_costs(const std::map<std::string, Row>& rows) {
+  std::printf(
+      "\n| scene | mask, ms a frame | regions | objects | share of the mask's time, %% |\n"
+      "|---|---|---|---|---|\n");
+  for (const auto& [scene, row] : rows) {
+    const double ms = 1000 / static_cast<double>(row.frames);
+    std::printf("| %s | %.3f | %.4f | %.4f | %.2f |\n", scene.c_str(), ms * row.mask_seconds,
+                ms * row.region_seconds, ms * row.object_seconds,
+                100 * (row.region_seconds + row.object_seconds) / row.mask_seconds);
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Follows things through simulated scenes and compares what is told with the truth.");
   std::vector<std::string> scenes = {"basic", "stop", "abandon", "remove", "clutter", "bootstrap"};
@@ -248,6 +267,7 @@ int run(int argc, char** argv) {
       }
   }
   print(rows);
+  if (from.empty()) print_costs(rows);
   return 0;
 }
 
