@@ -178,6 +178,68 @@ TEST(Library, RefusesWhatItCannotDo) {
   EXPECT_EQ(mask.size(), cv::Size(6, 4));
 }
 
+// A red square crosses, stands, and goes out.
+TEST(Objects, AreToldOfAndFollowed) {
+  Options options;
+  options.window_size = 40;
+  options.follow_objects = true;
+  Separator separator(options);
+  std::vector<qdmd::library::ObjectEvent> told;
+  separator.on_event([&](const qdmd::library::ObjectEvent& event) { told.push_back(event); });
+  int id = 0;
+  cv::Mat mask(90, 120, CV_8UC1);
+  for (int t = 0; t < 340; ++t) {
+    cv::Mat frame(90, 120, CV_8UC3);
+    const int left = 2 * (std::min(t, 150) - 120 + std::max(0, t - 230)) - 16;
+    for (int y = 0; y < 90; ++y)
+      for (int x = 0; x < 120; ++x) {
+        const bool inside = x >= left && x < left + 16 && y >= 40 && y < 56;
+        const auto grey = static_cast<uint8_t>(60 + (7 * x + 3 * y) % 80);
+        frame.at<cv::Vec3b>(y, x) = inside ? cv::Vec3b(20, 20, 250) : cv::Vec3b(grey, grey, grey);
+      }
+    separator.apply(frame.data, {120, 90, static_cast<ptrdiff_t>(frame.step), true}, mask.data,
+                    static_cast<ptrdiff_t>(mask.step));
+    if (t != 210) continue;
+    const auto objects = separator.objects();
+    ASSERT_EQ(1u, objects.size());
+    id = objects[0].id;
+    EXPECT_EQ(left, objects[0].x);
+    EXPECT_EQ(16, objects[0].width);
+    EXPECT_NEAR(90 / 25.0, objects[0].age, 0.2);
+    EXPECT_NEAR(60 / 25.0, objects[0].standing, 0.2);
+    EXPECT_TRUE(objects[0].appeared);
+  }
+  using qdmd::library::Event;
+  std::vector<Event> of_things;
+  for (const auto& event : told) {
+    if (event.event == Event::motion_begins || event.event == Event::motion_ends) continue;
+    of_things.push_back(event.event);
+    EXPECT_EQ(id, event.object.id);
+    EXPECT_FALSE(event.cut_off);
+  }
+  EXPECT_EQ((std::vector{Event::appeared, Event::stopped, Event::moved_on, Event::gone}),
+            of_things);
+  told.clear();
+  separator.end();
+  EXPECT_TRUE(told.empty() || told[0].event == Event::motion_ends) << "nothing is there any more";
+}
+
+TEST(Objects, AreNotFollowedWithoutBeingAsked) {
+  Separator separator;
+  int told = 0;
+  separator.on_event([&](const qdmd::library::ObjectEvent&) { ++told; });
+  for (const cv::Mat& frame : street(160, 120, 60)) {
+    cv::Mat mask(frame.size(), CV_8UC1);
+    separator.apply(frame.data, {160, 120, static_cast<ptrdiff_t>(frame.step), true}, mask.data,
+                    static_cast<ptrdiff_t>(mask.step));
+  }
+  EXPECT_EQ(0, told);
+  EXPECT_TRUE(separator.objects().empty());
+  Options options;
+  options.frames_per_second = 0;
+  EXPECT_THROW(Separator{options}, std::invalid_argument);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
