@@ -75,9 +75,9 @@ std::string names(const std::vector<Told>& all) {
   return text;
 }
 
-// A red square that comes in from the left with frame 60, stands from frame 90 to 160 and goes out
-// on the right.
-constexpr int kComes = 60, kStops = 90, kGoesOn = 160, kSide = 16;
+// A red square that comes in from the left with frame 120, stands from frame 150 to 220 and goes
+// out on the right.
+constexpr int kComes = 120, kStops = 150, kGoesOn = 220, kSide = 16;
 int left_of_square(int t) {
   const int walked = std::min(t, kStops) - kComes + std::max(0, t - kGoesOn);
   return 2 * walked - kSide;
@@ -95,7 +95,7 @@ TEST(Objects, AreToldOfOnceEach) {
   Stream stream(std::string(kLive) + "object-snapshots=true motion-end-time=2.5",
                 GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);
-  stream.push_many(0, 300, paint_visitor);
+  stream.push_many(0, 360, paint_visitor);
   const auto all = take(element.messages());
   const auto things = of_things(all);
   EXPECT_EQ("appeared stopped moved-on gone", names(things));
@@ -123,7 +123,7 @@ TEST(Objects, SendNothingWithoutBeingAsked) {
   Stream stream("qdmdbackground mode=live window-size=40 regions=true", GST_VIDEO_FORMAT_RGB,
                 kWidth, kHeight);
   Element element(stream);
-  stream.push_many(0, 120, paint_visitor);
+  stream.push_many(0, 180, paint_visitor);
   ASSERT_TRUE(stream.eos());
   EXPECT_TRUE(element.messages().empty());
 }
@@ -131,7 +131,7 @@ TEST(Objects, SendNothingWithoutBeingAsked) {
 TEST(Objects, HaveTheNumberOfTheirRegions) {
   Stream stream(std::string(kLive) + "regions=true", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);
-  stream.push_many(0, 150, paint_visitor);
+  stream.push_many(0, 210, paint_visitor);
   const auto things = of_things(take(element.messages()));
   ASSERT_EQ("appeared stopped", names(things));
   const auto out = stream.take_all();
@@ -152,17 +152,17 @@ TEST(Objects, HaveTheNumberOfTheirRegions) {
     EXPECT_LE(share, 1);
     EXPECT_GE(speed, 0);
     if (buffer != out.back()) continue;
-    EXPECT_NEAR((149 - kComes) * double(kFrame), double(age), 3 * double(kFrame));
-    EXPECT_NEAR((149 - kStops) * double(kFrame), double(standing), 5 * double(kFrame));
+    EXPECT_NEAR((209 - kComes) * double(kFrame), double(age), 3 * double(kFrame));
+    EXPECT_NEAR((209 - kStops) * double(kFrame), double(standing), 5 * double(kFrame));
   }
-  EXPECT_NEAR(150 - kComes, seen, 3);
+  EXPECT_NEAR(210 - kComes, seen, 3);
 }
 
 // A thing is there, and the stream ends in some way.
 class CutOff : public testing::Test {
  protected:
   CutOff() : stream_(kLive, GST_VIDEO_FORMAT_RGB, kWidth, kHeight), element_(stream_) {
-    stream_.push_many(0, 100, paint_visitor);
+    stream_.push_many(0, 160, paint_visitor);
     const auto things = of_things(take(element_.messages()));
     EXPECT_EQ("appeared", names(things));
     if (!things.empty()) id_ = things[0].id;
@@ -195,7 +195,7 @@ TEST_F(CutOff, ByAFlushAndNumbersGoOn) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   send(gst_event_new_segment(&segment));
-  stream_.push_many(0, 100, paint_visitor);
+  stream_.push_many(0, 160, paint_visitor);
   const auto things = of_things(take(element_.messages()));
   ASSERT_EQ("appeared", names(things));
   EXPECT_GT(things[0].id, id_);
@@ -216,16 +216,16 @@ TEST_F(CutOff, ByOtherCaps) {
 
 TEST_F(CutOff, ByAReset) {
   g_signal_emit_by_name(element_.get(), "reset");
-  stream_.push_many(100, 1, paint_visitor);
+  stream_.push_many(160, 1, paint_visitor);
   expect_cut_off();
 }
 
 TEST_F(CutOff, WhereNobodyWantsToHearAnyMore) {
   element_.set("object-messages", FALSE);
-  stream_.push_many(100, 10, paint_visitor);
+  stream_.push_many(160, 10, paint_visitor);
   expect_cut_off();
   element_.set("object-messages", TRUE);
-  stream_.push_many(110, 30, paint_visitor);
+  stream_.push_many(170, 30, paint_visitor);
   EXPECT_TRUE(take(element_.messages()).empty()) << "nothing is told of a stream that is too young";
 }
 
@@ -233,7 +233,7 @@ TEST(Objects, OfBatchAreToldWithTheirFrames) {
   Stream stream("qdmdbackground window-size=40 object-messages=true", GST_VIDEO_FORMAT_RGB, kWidth,
                 kHeight);
   Element element(stream);
-  stream.push_many(0, 300, paint_visitor);
+  stream.push_many(0, 360, paint_visitor);
   ASSERT_TRUE(stream.eos());
   const auto things = of_things(take(element.messages()));
   ASSERT_FALSE(things.empty());
@@ -264,14 +264,14 @@ TEST(Objects, OfManyPadsAreToldOnce) {
         "object-appear-time=0.1 object-stop-time=0.4 regions-min-area=4");
     for (const std::string& pad : pads) rig.listen(pad);
     rig.start(GST_VIDEO_FORMAT_GRAY8, kWidth, kHeight);
-    for (int t = 0; t < 120; ++t) {
+    for (int t = 0; t < 200; ++t) {
       GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size_t{kWidth} * kHeight, nullptr);
       GstMapInfo map;
       ASSERT_TRUE(gst_buffer_map(buffer, &map, GST_MAP_WRITE));
       for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x) {
-          const int left = t - 60;
-          const bool in = x >= left && x < left + 16 && y >= 30 && y < 50 && t >= 60;
+          const int left = t - 120;
+          const bool in = x >= left && x < left + 16 && y >= 30 && y < 50 && t >= 120;
           map.data[y * GST_ROUND_UP_4(kWidth) + x] = guint8(in ? 240 : 40 + (3 * x + y) % 40);
         }
       gst_buffer_unmap(buffer, &map);
