@@ -139,11 +139,14 @@ void ObjectTracker::take_pieces(const ObjectFrame& frame) {
     if (owner_[r] >= 0) continue;
     for (size_t t = 0; t < tracks_.size(); ++t) {
       const Track& track = tracks_[t];
-      if (!track.seen || owner_[static_cast<size_t>(track.region)] != static_cast<int>(t)) continue;
-      ObjectBox& its = boxes_[static_cast<size_t>(track.region)];
+      if (!track.seen) continue;
       const ObjectBox room = track.expected.wider(0.1 * track.expected.longer());
-      const ObjectBox all = both(its, boxes_[r]);
       if (shared(room, boxes_[r]) < kInside * boxes_[r].area()) continue;
+      // What is hidden for the most part has no box of its own.
+      if (boxes_[r].area() < kPiece * track.expected.area()) owner_[r] = static_cast<int>(t);
+      if (owner_[static_cast<size_t>(track.region)] != static_cast<int>(t)) continue;
+      ObjectBox& its = boxes_[static_cast<size_t>(track.region)];
+      const ObjectBox all = both(its, boxes_[r]);
       if (all.width > std::max(its.width, kGrows * track.expected.width) ||
           all.height > std::max(its.height, kGrows * track.expected.height))
         continue;
@@ -358,7 +361,8 @@ void ObjectTracker::tell_of_motion(int64_t time) {
     if (track.object.appeared) newest = std::max(newest, last_motion(track));
   if (newest == time && !in_motion_) {
     in_motion_ = true;
-    add(Kind::motion_begins, {});
+    // Before what moves is told of.
+    events_.insert(events_.begin(), {Kind::motion_begins, {}, false});
   }
   if (!in_motion_ || time - newest < nanoseconds(options_.grace_seconds)) return;
   in_motion_ = false;

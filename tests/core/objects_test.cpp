@@ -55,6 +55,12 @@ class Tracking : public testing::Test {
     return static_cast<int>(std::count_if(told_.begin(), told_.end(),
                                           [&](const auto& one) { return one.first.kind == kind; }));
   }
+  const Object& first(Kind kind) const {
+    static const Object kNone;
+    for (const auto& [event, at] : told_)
+      if (event.kind == kind) return event.object;
+    return kNone;
+  }
   int frame_of(Kind kind) const {
     for (const auto& [event, at] : told_)
       if (event.kind == kind) return at;
@@ -111,7 +117,7 @@ TEST_F(Tracking, OneThatCrossesHasOneNumberAndIsToldOfTwice) {
   EXPECT_EQ(1, count(Kind::gone));
   EXPECT_NEAR(5, frame_of(Kind::appeared), 2);
   EXPECT_NEAR(59 + 25, frame_of(Kind::gone), 1);
-  EXPECT_EQ(7, told_[0].first.object.first_stamp) << "what was said of its first frame";
+  EXPECT_EQ(7, first(Kind::appeared).first_stamp) << "what was said of its first frame";
   EXPECT_EQ(2, count(Kind::appeared) + count(Kind::gone));
 }
 
@@ -180,7 +186,7 @@ TEST_F(Tracking, WhoGoesOutAndWhoComesInThereAreTwo) {
     push(left < 318 ? std::vector{region(left, 100, std::min(30, 320 - left), 80)}
                     : std::vector<Region>{});
   }
-  const int before = told_.front().first.object.id;
+  const int before = first(Kind::appeared).id;
   for (int t = 0; t < 20; ++t) {
     const int left = 318 - 3 * t;
     push({region(left, 100, std::min(30, 320 - left), 80)});

@@ -99,7 +99,7 @@ TEST(Objects, AreToldOfOnceEach) {
   const auto all = take(element.messages());
   const auto things = of_things(all);
   EXPECT_EQ("appeared stopped moved-on gone", names(things));
-  EXPECT_EQ("appeared motion-begins stopped motion-ends moved-on motion-begins gone motion-ends",
+  EXPECT_EQ("motion-begins appeared stopped motion-ends motion-begins moved-on gone motion-ends",
             names(all));
   ASSERT_EQ(4u, things.size());
   for (const Told& told : things) {
