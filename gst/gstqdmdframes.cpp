@@ -361,7 +361,7 @@ bool configure(State& state, const Settings& settings, const GstVideoInfo& info,
   warn_of_settings_without_effect(state, settings);
   forget_frames(state);
   state.objects.cut_off(state.element);
-  state.objects.begin(info);
+  state.objects.begin(info, settings.engine.mode == Mode::live);
   state.info = info;
   state.solves_told = 0;
   EngineOptions options = settings.engine;

@@ -78,8 +78,9 @@ int default_least_area(const GstVideoInfo& info) {
 
 }  // namespace
 
-void ObjectWatch::begin(const GstVideoInfo& info) {
+void ObjectWatch::begin(const GstVideoInfo& info, bool live) {
   info_ = info;
+  live_ = live;
   any_ = false;
   events_.clear();
   shown_.clear();
@@ -138,7 +139,7 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
   removed_.clear();
   const Pose pose = settings.wishes.stabilize_output ? Pose() : frame->pose();
   UncoveredPlace place;
-  while (frame->next_uncovered(&place))
+  while (live_ && frame->next_uncovered(&place))
     removed_.push_back(
         {{place.x - pose.x, place.y - pose.y, double(place.width), double(place.height)},
          double(place.stood) * double(step_of(info_)) / double(GST_SECOND)});

@@ -17,8 +17,9 @@ namespace qdmd {
 // which they leave.
 class ObjectWatch {
  public:
-  // For video of that size. Numbers go on.
-  void begin(const GstVideoInfo& info);
+  // For video of that size. Numbers go on. live: frames leave as they come, so that what was
+  // uncovered is known with them.
+  void begin(const GstVideoInfo& info, bool live);
   // The element starts: numbers begin at 1.
   void begin_numbers() { tracker_.begin_numbers(); }
   // Gives all memory back. Nothing is followed any more.
@@ -55,7 +56,7 @@ class ObjectWatch {
   BufferPtr frame_;                   // that the events are of, where somebody wants snapshots
   std::vector<const Object*> shown_;  // the regions to attach, the largest first
   Times now_;
-  bool any_ = false, tells_ = false, attaches_ = false;
+  bool live_ = false, any_ = false, tells_ = false, attaches_ = false;
   int least_area_ = 0;  // of regions that are attached
 };
 

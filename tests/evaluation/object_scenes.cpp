@@ -52,7 +52,7 @@ ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool l
           finder.find(mask, nullptr, kWidth, kHeight, ObjectTracker::least_area(kHeight, {}), true);
       result.region_seconds += seconds_since(middle);
       UncoveredPlace place;
-      while (leaving->next_uncovered(&place))
+      while (live && leaving->next_uncovered(&place))
         frame.removed.push_back(
             {{double(place.x), double(place.y), double(place.width), double(place.height)},
              static_cast<double>(place.stood) / kRate});
