@@ -4,7 +4,9 @@
 #include <cmath>
 #include <new>
 
-#include "gst/gstqdmdenums.h"
+#ifdef QDMD_HAVE_ANALYTICS
+#include "gst/analytics.h"
+#endif
 #include "gst/videoview.h"
 
 namespace qdmd {
@@ -164,6 +166,11 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
 }
 
 void ObjectWatch::attach(GstBuffer* buffer) const {
+#ifdef QDMD_HAVE_ANALYTICS
+  if (attaches_)
+    attach_analytics(buffer, {&shown_, mask_.data(), GST_VIDEO_INFO_WIDTH(&info_),
+                              GST_VIDEO_INFO_HEIGHT(&info_)});
+#endif
   for (const Object* object : shown_) {
     const Pixels box(object->box);
     auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", box.x, box.y,
