@@ -45,26 +45,44 @@ double ObjectLife::way(const ObjectBox& from, const ObjectBox& to) const {
                           at_end(from.bottom(), to.bottom(), height_)));
 }
 
-// The earliest place from which on it stayed near to where it is now.
-std::deque<ObjectLife::Place>::const_iterator ObjectLife::stays_from() const {
-  auto since = places_.end();
-  while (since != places_.begin() && distance(box_, std::prev(since)->box) <= still()) --since;
-  return since;
+// Since when it stayed near to where it is now.
+int64_t ObjectLife::stays_since() const {
+  size_t at = count_ - 1;
+  while (at > 0 && distance(box_, place(at - 1).box) <= still()) --at;
+  return place(at).time;
+}
+
+// One that is older than `stop` stays, from which on it may have stood.
+void ObjectLife::add_place(int64_t time, int64_t stop) {
+  const auto drop = [this] {
+    begin_ = (begin_ + 1) % kPlaces;
+    --count_;
+  };
+  while (count_ > 2 && time - place(1).time >= stop) drop();
+  // Of long times, the newest place stands for those close before it.
+  const bool close =
+      count_ > 1 && time - place(count_ - 2).time < stop / static_cast<int64_t>(kPlaces - 4);
+  if (close)
+    --count_;
+  else if (count_ == kPlaces)
+    drop();
+  places_[(begin_ + count_++) % kPlaces] = {time, box_};
 }
 
 void ObjectLife::judge_standing(int64_t time, int64_t stop) {
   if (stands_) {
     if (distance(box_, stood_at_->box) > std::max(2 * kPixels, kMovedOn * box_.longer())) {
       stands_ = false;
-      places_.erase(places_.begin(), places_.end() - 1);
+      begin_ = (begin_ + count_ - 1) % kPlaces;
+      count_ = 1;
     }
     return;
   }
-  const auto since = stays_from();
-  if (time - since->time < stop) return;
+  const int64_t since = stays_since();
+  if (time - since < stop) return;
   stands_ = true;
-  standing_since_ = since->time;
-  stood_at_ = places_.back();
+  standing_since_ = since;
+  stood_at_ = {time, box_};
 }
 
 void ObjectLife::miss(int64_t time, int64_t frame) {
@@ -89,11 +107,9 @@ void ObjectLife::follow(const Sight& sight, int64_t time, int64_t frame) {
     before_ = box_;
   }
   const int64_t stop = time_of(options_->stop_seconds, frame);
-  places_.push_back({time, box_});
-  // One that is older than `stop` stays, from which on it may have stood.
-  while (places_.size() > 2 && time - places_[1].time >= stop) places_.pop_front();
+  add_place(time, stop);
   double largest = 0;
-  for (const Place& place : places_) largest = std::max(largest, place.box.area());
+  for (size_t at = 0; at < count_; ++at) largest = std::max(largest, place(at).box.area());
   if (2 * box_.area() >= largest) last_whole_ = box_;
   const double gone = way(first_->box, sight.region);
   came_ |= gone >= box_.longer() / 2;
@@ -104,7 +120,7 @@ void ObjectLife::follow(const Sight& sight, int64_t time, int64_t frame) {
   const bool goes = gone >= enough && gone >= kStraight * way_ &&
                     time - first_->time >= time_of(options_->appear_seconds, frame);
   const bool stood =
-      alone_since_ != kNoTime && time - std::max(stays_from()->time, alone_since_) >=
+      alone_since_ != kNoTime && time - std::max(stays_since(), alone_since_) >=
                                      time_of(kStandingShows * options_->stop_seconds, frame);
   appeared_ =
       longest_ >= options_->min_size * height_ && seen_ >= kMostFrames * frames_ && (goes || stood);

@@ -1,7 +1,8 @@
 // What becomes of one thing: it appears, stops, moves on and is gone, from its boxes alone.
 #pragma once
 
-#include <deque>
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "core/objects/object.h"
@@ -62,13 +63,19 @@ class ObjectLife {
   };
   double still() const;
   double way(const ObjectBox& from, const ObjectBox& to) const;
-  std::deque<Place>::const_iterator stays_from() const;
+  // 0: the oldest.
+  const Place& place(size_t at) const { return places_[(begin_ + at) % kPlaces]; }
+  void add_place(int64_t time, int64_t stop);
+  int64_t stays_since() const;
   void judge_standing(int64_t time, int64_t stop);
 
   const ObjectOptions* options_;
   int width_, height_;
   ObjectBox box_, last_whole_, before_;
-  std::deque<Place> places_;               // of the last stop_seconds
+  // Of the last stop_seconds, so many at most, the oldest first.
+  static constexpr size_t kPlaces = 64;
+  std::array<Place, kPlaces> places_;
+  size_t begin_ = 0, count_ = 0;
   std::optional<Place> first_, stood_at_;  // first_: a region
   double longest_ = 0, way_ = 0;
   int64_t last_ = 0, standing_since_ = kNoTime, alone_since_ = kNoTime;

@@ -44,6 +44,7 @@ void ObjectTracker::begin(int width, int height, const ObjectOptions& options) {
   options_ = options;
   width_ = width, height_ = height;
   tracks_.clear(), objects_.clear(), events_.clear();
+  tracks_.reserve(RegionFinder::kMostRegions);
   removals_.forget();
   time_ = moved_ = begun_ = kNoTime;
   frame_ = 0;
@@ -111,19 +112,19 @@ void ObjectTracker::share_regions(const ObjectFrame& frame) {
     }
   }
   // One that has not appeared yet was a piece of the other.
-  std::vector<char> has_old(frame.regions.size(), 0);
+  has_old_.assign(frame.regions.size(), 0);
   for (const Track& track : tracks_)
-    if (track.seen && track.object.appeared) has_old[static_cast<size_t>(track.region)] = 1;
-  std::vector<int> kept(frame.regions.size(), -1);
+    if (track.seen && track.object.appeared) has_old_[static_cast<size_t>(track.region)] = 1;
+  kept_.assign(frame.regions.size(), -1);
   for (const Track& track : tracks_) {
     if (!track.seen || track.object.appeared) continue;
-    int& first = kept[static_cast<size_t>(track.region)];
+    int& first = kept_[static_cast<size_t>(track.region)];
     if (first < 0 || track.object.id < first) first = track.object.id;
   }
   std::erase_if(tracks_, [&](const Track& track) {
     if (!track.seen || track.object.appeared) return false;
     const auto r = static_cast<size_t>(track.region);
-    return has_old[r] || kept[r] != track.object.id;
+    return has_old_[r] || kept_[r] != track.object.id;
   });
   for (int& owner : owner_) owner = -1;
   for (size_t t = 0; t < tracks_.size(); ++t)
@@ -209,22 +210,24 @@ void ObjectTracker::measure_together(const std::vector<size_t>& tracks, const Ob
 }
 
 void ObjectTracker::measure(const ObjectFrame& frame, double seconds) {
-  std::vector<std::vector<size_t>> shown(frame.regions.size());
+  // Lists keep their memory.
+  if (shown_.size() < frame.regions.size()) shown_.resize(frame.regions.size());
+  for (std::vector<size_t>& shown : shown_) shown.clear();
   for (size_t t = 0; t < tracks_.size(); ++t) {
     if (tracks_[t].seen)
-      shown[static_cast<size_t>(tracks_[t].region)].push_back(t);
+      shown_[static_cast<size_t>(tracks_[t].region)].push_back(t);
     else if (tracks_[t].life.standing_since() == kNoTime &&
              frame.time - tracks_[t].last_seen <= nanoseconds(kGoesOn))
       tracks_[t].motion.go_on(seconds);
   }
   for (size_t r = 0; r < frame.regions.size(); ++r) {
-    if (shown[r].empty()) continue;
+    if (shown_[r].empty()) continue;
     const ObjectBox& region = boxes_[r];
-    const bool together = shown[r].size() > 1;
+    const bool together = shown_[r].size() > 1;
     double all = 0;
-    for (size_t t : shown[r]) all += tracks_[t].expected.area();
-    if (together) measure_together(shown[r], region, seconds);
-    for (size_t t : shown[r]) {
+    for (size_t t : shown_[r]) all += tracks_[t].expected.area();
+    if (together) measure_together(shown_[r], region, seconds);
+    for (size_t t : shown_[r]) {
       Track& track = tracks_[t];
       Object& object = track.object;
       object.mean_residual = frame.regions[r].mean_residual;
@@ -241,15 +244,15 @@ void ObjectTracker::measure(const ObjectFrame& frame, double seconds) {
   }
   // Pieces count, too.
   for (size_t r = 0; r < frame.regions.size(); ++r) {
-    if (owner_[r] < 0 || !shown[r].empty()) continue;
+    if (owner_[r] < 0 || !shown_[r].empty()) continue;
     tracks_[static_cast<size_t>(owner_[r])].object.area += frame.regions[r].area;
   }
-  find_hidden(frame.time, shown);
+  find_hidden(frame.time);
 }
 
-void ObjectTracker::find_hidden(int64_t time, const std::vector<std::vector<size_t>>& shown) {
+void ObjectTracker::find_hidden(int64_t time) {
   for (Track& track : tracks_) {
-    const bool with_others = track.seen && shown[static_cast<size_t>(track.region)].size() > 1;
+    const bool with_others = track.seen && shown_[static_cast<size_t>(track.region)].size() > 1;
     const bool hidden =
         with_others && std::any_of(tracks_.begin(), tracks_.end(), [&](const Track& other) {
           return &other != &track && other.seen && other.region == track.region &&

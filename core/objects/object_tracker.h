@@ -83,7 +83,7 @@ class ObjectTracker {
   void begin_tracks(const ObjectFrame& frame);
   void measure(const ObjectFrame& frame, double seconds);
   void measure_together(const std::vector<size_t>& tracks, const ObjectBox& region, double seconds);
-  void find_hidden(int64_t time, const std::vector<std::vector<size_t>>& shown);
+  void find_hidden(int64_t time);
   void tell(const ObjectFrame& frame);
   void tell_of_removals(const ObjectFrame& frame);
   void tell_of_motion(int64_t time);
@@ -101,8 +101,11 @@ class ObjectTracker {
   Removals removals_;
   Assignment assignment_;
   std::vector<double> cost_;
-  std::vector<ObjectBox> boxes_;  // of the frame's regions
-  std::vector<int> owner_;        // of each region: a track, or -1
+  std::vector<ObjectBox> boxes_;            // of the frame's regions
+  std::vector<std::vector<size_t>> shown_;  // by regions: the tracks that each shows
+  std::vector<char> has_old_;
+  std::vector<int> kept_;
+  std::vector<int> owner_;  // of each region: a track, or -1
   int64_t time_ = kNoTime, frame_ = 0, begun_ = kNoTime;
   int64_t moved_ = kNoTime;  // the last motion of what is gone
   bool in_motion_ = false;
