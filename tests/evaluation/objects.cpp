@@ -235,7 +235,7 @@ int run(int argc, char** argv) {
   CLI::App app("Follows things through simulated scenes and compares what is told with the truth.");
   std::vector<std::string> scenes = {"basic", "stop", "abandon", "remove", "clutter", "bootstrap"};
   int first = 0, seeds = 20, frames = 600;
-  bool batch = false, verbose = false;
+  bool batch = false, verbose = false, perfect = false;
   std::string keep, from;
   app.add_option("--scenes", scenes, "scenes, as qdmdscenesrc names them")->delimiter(' ');
   app.add_option("--first-seed", first, "seeds from this one on");
@@ -243,6 +243,7 @@ int run(int argc, char** argv) {
   app.add_option("--frames", frames, "of each scene");
   app.add_flag("--batch", batch, "mode=batch in place of live");
   app.add_flag("--verbose", verbose, "print each event that is missed, late or wrong");
+  app.add_flag("--perfect", perfect, "fail where an event is missed, late or wrong");
   app.add_option("--keep", keep, "write what the masks showed to this file");
   app.add_option("--from", from, "take what masks showed from this file, and make none");
   CLI11_PARSE(app, argc, argv);
@@ -268,7 +269,11 @@ int run(int argc, char** argv) {
   }
   print(rows);
   if (from.empty()) print_costs(rows);
-  return 0;
+  int wrong = 0;
+  for (const auto& [scene, row] : rows)
+    for (const auto& [kind, scores] : row.events)
+      wrong += scores.late + scores.missed + scores.wrong;
+  return rows.empty() || (perfect && wrong > 0) ? 1 : 0;
 }
 
 }  // namespace
