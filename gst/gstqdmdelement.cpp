@@ -134,15 +134,16 @@ void install_properties_and_signals(GObjectClass* klass, WhichSettings which) {
           GParamFlags(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property(
       klass, kStatsProperty,
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counters, and facts about the newest solve: rank, lambda (real and "
-                         "imaginary part), omega in rad/frame, residual, condition, "
-                         "rounding-bound and sensitivity in levels, solver (that gave the result), "
-                         "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
-                         "what it was given: sample-step, iterations, solve-period (of so many "
-                         "windows or hops one is solved); time-per-frame (ms), as learnt",
-                         GST_TYPE_STRUCTURE,
-                         GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+      g_param_spec_boxed(
+          "stats", "Statistics",
+          "Counters, and facts about the newest solve: rank, lambda (real and "
+          "imaginary part), omega in rad/frame, residual, condition, "
+          "rounding-bound and sensitivity in levels, solver and estimator (that gave "
+          "the result), "
+          "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
+          "what it was given: sample-step, iterations, solve-period (of so many "
+          "windows or hops one is solved); time-per-frame (ms), as learnt",
+          GST_TYPE_STRUCTURE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   g_object_class_install_property(
       klass, kBackgroundProperty,
       g_param_spec_boxed(

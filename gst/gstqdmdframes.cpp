@@ -202,6 +202,20 @@ static void warn_of_no_room(State& state, const EngineReport& engine) {
       (nullptr));
 }
 
+// Warns of rectangles that no pixel of the video is in, once each time that they are set.
+static void warn_of_areas_outside(State& state, const Settings& settings) {
+  if (std::exchange(state.ignored_seen, settings.ignored_set) == settings.ignored_set) return;
+  const int width = GST_VIDEO_INFO_WIDTH(&state.info), height = GST_VIDEO_INFO_HEIGHT(&state.info);
+  const guint outside = settings.wishes.ignored.outside(width, height);
+  if (outside == 0) return;
+  GST_ELEMENT_WARNING(state.element, LIBRARY, SETTINGS,
+                      ("ignore has %u rectangles outside of the picture, which is %dx%d: they "
+                       "change nothing. A rectangle is <x, y, width, height> in pixels of the "
+                       "video that comes in.",
+                       outside, width, height),
+                      (nullptr));
+}
+
 // Sets controlled properties to what they are at the time of `buffer`.
 static void follow_controllers(State& state, GstBuffer* buffer) {
   const GstSegment& segment = *state.segment;
@@ -364,6 +378,7 @@ bool configure(State& state, const Settings& settings, const GstVideoInfo& info,
   state.objects.begin(info, settings.engine.mode == Mode::live);
   state.info = info;
   state.solves_told = 0;
+  state.ignored_seen = 0;
   EngineOptions options = settings.engine;
   // The first window teaches masks before a frame says what is wished of its pictures.
   static_cast<PictureWishes&>(options) = settings.wishes;
@@ -484,6 +499,7 @@ GstFlowReturn take_frame(State& state, BufferPtr buffer) {
   GST_OBJECT_LOCK(state.element);
   const Settings settings = state.settings;
   GST_OBJECT_UNLOCK(state.element);
+  warn_of_areas_outside(state, settings);
   const bool masks = wants_objects(settings) || state.wants_masks(settings);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(

@@ -148,8 +148,13 @@ void ObjectWatch::look(LeavingFrame* frame, const Settings& settings, const GstS
   const gint64 stamp = GST_CLOCK_TIME_IS_VALID(now_.stream) ? gint64(now_.stream) : -1;
   const auto& events = tracker_.push({regions, removed_, now_.clock, stamp});
   shown_.clear();
-  for (const Object& object : tracker_.objects())
-    if (attaches_ && object.area >= least_area_) shown_.push_back(&object);
+  for (const Object& object : tracker_.objects()) {
+    const Pixels box(object.box);
+    const Region region = {int(box.x), int(box.y), int(box.width), int(box.height)};
+    // What is chosen leaves out the edges of what comes in.
+    const bool is_left_out = wanted == 0 && is_strip_at_edge(region, width, height);
+    if (attaches_ && object.area >= least_area_ && !is_left_out) shown_.push_back(&object);
+  }
   std::sort(shown_.begin(), shown_.end(), [](const Object* a, const Object* b) {
     return a->area > b->area || (a->area == b->area && a->id < b->id);
   });

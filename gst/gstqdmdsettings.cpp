@@ -238,6 +238,7 @@ const Property kProperties[] = {
      [](Settings& s, const GValue* v) {
        s.wishes.ignored = {};
        s.ignored_left_out = add_areas_of(v, &s.wishes.ignored);
+       ++s.ignored_set;
      },
      [](const Settings& s, GValue* v) { areas_to(s.wishes.ignored, v); }},
     {[](const Settings&) {

@@ -34,6 +34,7 @@ struct Settings {
   double time_budget = 0;      // milliseconds a frame; 0: no limit
   double absorb_time = 300;    // seconds; 0: never
   guint ignored_left_out = 0;  // rectangles that are none, or too many
+  guint ignored_set = 0;       // how often they were set
   GQuark ignored_type = 0;     // of regions of interest that are ignored, too; 0: none
   EngineOptions engine = with_stabilize(Stabilize::translation);
   Wishes wishes;                     // what changes while playing

@@ -106,6 +106,7 @@ class State {
   ObjectWatch objects;
   guint64 solves_told = 0, scenes_told = 0, views_told = 0;  // of the engine's
   bool warned_of_no_room = false;
+  guint ignored_seen = 0;             // Settings::ignored_set of those that were looked at
   bool camera_moved = false;          // in the frame that left last
   std::bitset<kMostSettings> warned;  // of settings without effect, a bit for each id
   StreamTime time;                    // of frames that come in

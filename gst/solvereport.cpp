@@ -74,16 +74,18 @@ GstStructure* make_stats(const SolveReport& report, const Counters& counters) {
       report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual, "condition", G_TYPE_DOUBLE,
       report.dmd.condition, "rounding-bound", G_TYPE_DOUBLE, report.dmd.rounding_bound,
       "sensitivity", G_TYPE_DOUBLE, report.dmd.sensitivity, "solver",
-      gst_qdmd_background_solver_get_type(), gint(report.dmd.solver), "converged", G_TYPE_BOOLEAN,
-      gboolean(report.dmd.converged), "replaced", G_TYPE_BOOLEAN, gboolean(report.replaced),
-      "noise", G_TYPE_DOUBLE, report.foreground.noise, "foreground-threshold", G_TYPE_DOUBLE,
-      report.foreground.threshold, "foreground-ratio", G_TYPE_DOUBLE, report.foreground.ratio,
-      "gram-time", G_TYPE_DOUBLE, report.gram_time, "solve-time", G_TYPE_DOUBLE, report.solve_time,
-      "sample-step", G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT,
-      guint(report.iterations), "solve-period", G_TYPE_UINT, counters.solve_period,
-      "time-per-frame", G_TYPE_DOUBLE, counters.time_per_frame, "camera-x", G_TYPE_DOUBLE,
-      counters.camera.x, "camera-y", G_TYPE_DOUBLE, counters.camera.y, "camera-angle",
-      G_TYPE_DOUBLE, degrees(counters.camera.angle), nullptr);
+      gst_qdmd_background_solver_get_type(), gint(report.dmd.solver), "estimator",
+      gst_qdmd_background_estimator_get_type(), gint(report.dmd.estimator), "converged",
+      G_TYPE_BOOLEAN, gboolean(report.dmd.converged), "replaced", G_TYPE_BOOLEAN,
+      gboolean(report.replaced), "noise", G_TYPE_DOUBLE, report.foreground.noise,
+      "foreground-threshold", G_TYPE_DOUBLE, report.foreground.threshold, "foreground-ratio",
+      G_TYPE_DOUBLE, report.foreground.ratio, "gram-time", G_TYPE_DOUBLE, report.gram_time,
+      "solve-time", G_TYPE_DOUBLE, report.solve_time, "sample-step", G_TYPE_UINT,
+      guint(report.sample_step), "iterations", G_TYPE_UINT, guint(report.iterations),
+      "solve-period", G_TYPE_UINT, counters.solve_period, "time-per-frame", G_TYPE_DOUBLE,
+      counters.time_per_frame, "camera-x", G_TYPE_DOUBLE, counters.camera.x, "camera-y",
+      G_TYPE_DOUBLE, counters.camera.y, "camera-angle", G_TYPE_DOUBLE,
+      degrees(counters.camera.angle), nullptr);
   GValue lambda = value_of(report.dmd.lambda);
   gst_structure_take_value(stats, "lambda", &lambda);
   add_spectrum(report.dmd, stats);
@@ -122,7 +124,8 @@ GstStructure* make_solve_message(const SolveReport& report, const Counters& coun
       "omega", G_TYPE_DOUBLE, report.dmd.omega, "residual", G_TYPE_DOUBLE, report.dmd.residual,
       "rounding-bound", G_TYPE_DOUBLE, report.dmd.rounding_bound, "sensitivity", G_TYPE_DOUBLE,
       report.dmd.sensitivity, "solver", gst_qdmd_background_solver_get_type(),
-      gint(report.dmd.solver), "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged),
+      gint(report.dmd.solver), "estimator", gst_qdmd_background_estimator_get_type(),
+      gint(report.dmd.estimator), "converged", G_TYPE_BOOLEAN, gboolean(report.dmd.converged),
       "replaced", G_TYPE_BOOLEAN, gboolean(report.replaced), "foreground-ratio", G_TYPE_DOUBLE,
       report.foreground.ratio, "solve-time", G_TYPE_DOUBLE, report.solve_time, "sample-step",
       G_TYPE_UINT, guint(report.sample_step), "iterations", G_TYPE_UINT, guint(report.iterations),

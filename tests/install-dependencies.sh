@@ -3,7 +3,7 @@
 # nothing when all are there.
 #
 #   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
-#                                               fuzz, tidy, coverage, neon
+#                                               fuzz, tidy, coverage, neon, python
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -16,7 +16,9 @@ test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-b
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x gstreamer1.0-opencv openmpi-bin
-  libopenmpi-dev)
+  libopenmpi-dev pybind11-dev python3-dev python3-pytest appstream)
+# The module qdmd for Python.
+python=(pybind11-dev python3-dev python3-numpy)
 # What gst/debian/control asks for beyond build; tests make a package, too.
 package=(debhelper dpkg-dev libopencv-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
@@ -45,7 +47,8 @@ for group in "$@"; do
     tidy) wanted+=("${tidy[@]}") ;;
     coverage) wanted+=("${coverage[@]}") ;;
     neon) wanted+=("${neon[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon)" >&2; exit 2 ;;
+    python) wanted+=("${python[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon, python)" >&2; exit 2 ;;
   esac
 done
 

@@ -56,7 +56,7 @@ list_sources() {
     return
   fi
   { git diff --name-only --diff-filter=d HEAD; git ls-files --others --exclude-standard; } |
-    grep -E '^(core|gst|examples|tests)/.*\.(cpp|h)$' || true
+    grep -E '^(core|gst|examples|python|tests)/.*\.(cpp|h)$' || true
 }
 mapfile -t sources < <(list_sources)
 if [ "${#sources[@]}" -gt 0 ] && ! clang-format --dry-run --Werror "${sources[@]}"; then

@@ -11,6 +11,14 @@ bool IgnoredAreas::add(const Rectangle& area) {
   return true;
 }
 
+unsigned IgnoredAreas::outside(int width, int height) const {
+  const auto begin = areas_.begin();
+  return static_cast<unsigned>(std::count_if(begin, begin + count_, [&](const Rectangle& area) {
+    return area.x >= width || area.y >= height || int64_t{area.x} + area.width <= 0 ||
+           int64_t{area.y} + area.height <= 0;
+  }));
+}
+
 void IgnoredAreas::clear(int y, int left, int count, uint8_t* samples) const {
   visit(y, left, count, [&](int64_t begin, int64_t end) {
     std::memset(samples + begin, 0, static_cast<size_t>(end - begin));

@@ -24,6 +24,9 @@ class IgnoredAreas {
   size_t size() const { return count_; }
   const Rectangle& operator[](size_t i) const { return areas_[i]; }
 
+  // How many rectangles have no pixel of a picture of width x height.
+  unsigned outside(int width, int height) const;
+
   // True where pixel (x, y) is ignored.
   bool has(int x, int y) const {
     bool any = false;

@@ -39,7 +39,9 @@ std::optional<BackgroundModes> forward_backward_modes(const SnapshotFactor<doubl
   const auto root = root_near(square, forward);
   if (!root) return std::nullopt;
   const internal::Projection<double> projection{spectrum.v_over_s, *root};
-  return checked(internal::modes_from_schur_form(projection, factor, options), rank,
+  // The noise that is kept beside the background has eigenvalues all around the unit circle here:
+  // time turned back grows as much as time shrinks. Those of exact are near 0.
+  return checked(internal::modes_from_schur_form(projection, factor, options, &forward), rank,
                  spectrum.sigma(0) / spectrum.sigma(rank - 1));
 }
 
@@ -194,6 +196,7 @@ BackgroundModes optimized_modes(const SnapshotFactor<double>& factor, const DmdO
   fit_to_window(&result, factor.r * result.combination, factor.r);
   const double residual = modes.summary.residual;
   describe_nearest(&result, residual);
+  result.summary.estimator = Estimator::optimized;
   return checked(result, modes.summary.rank, modes.summary.condition).value_or(modes);
 }
 
@@ -205,12 +208,12 @@ BackgroundModes solve_factor(const SnapshotFactor<double>& factor, const DmdOpti
   if (options.estimator == Estimator::optimized) return optimized_modes(factor, options);
   DmdOptions low = options;
   low.rank = std::max(1, low.rank);
-  if (options.estimator == Estimator::forward_backward) {
-    if (auto modes = forward_backward_modes(factor, low)) return *std::move(modes);
-  } else if (auto modes = total_modes(factor, low)) {
-    return *std::move(modes);
-  }
-  return reduced_qdmd(factor, low);
+  auto modes = options.estimator == Estimator::forward_backward
+                   ? forward_backward_modes(factor, low)
+                   : total_modes(factor, low);
+  if (!modes) return reduced_qdmd(factor, low);
+  modes->summary.estimator = options.estimator;
+  return *std::move(modes);
 }
 
 }  // namespace qdmd

@@ -8,7 +8,8 @@ namespace qdmd {
 // The background modes by options.estimator: reduced_qdmd() for Estimator::exact.
 //
 // forward_backward (Dawson et al. 2016): the square root of A_f A_b^-1 that is nearest to A_f = Q~;
-// A_b is the same of time turned back. Where it finds none, the result is that of exact.
+// A_b is the same of time turned back. The eigenvalues of A_f say which modes are background. Where
+// it finds no root, the result is that of exact, and DmdSummary::estimator says so.
 // total (Hemati et al. 2017): X and Y times the projection on the leading right singular vectors
 // of [X; Y], then as the paper.
 // At full rank both are the paper's own: X and Y then span the same, time can be turned back

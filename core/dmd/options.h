@@ -72,6 +72,8 @@ struct DmdSummary {
   bool converged = true;
   // The solver that gave the result: another than was asked for where that one could not.
   Solver solver = Solver::gram;
+  // The estimator that gave the result: exact where the one that was asked for found none.
+  Estimator estimator = Estimator::exact;
   // No level of L(t) inside the window is farther from what exact arithmetic gives; infinite where
   // that cannot be told. Of exact DMD: not computed, infinite.
   double rounding_bound = std::numeric_limits<double>::infinity();

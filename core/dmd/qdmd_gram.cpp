@@ -29,9 +29,9 @@ SnapshotFactor<double> factorize_gram_extended(const QuaternionMatrixd& g) {
 
 template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double>&, const DmdOptions&);
 namespace internal {
-template std::optional<QuaternionModes<double>> modes_from_schur_form(const Projection<double>&,
-                                                                      const SnapshotFactor<double>&,
-                                                                      const DmdOptions&);
+template std::optional<QuaternionModes<double>> modes_from_schur_form(
+    const Projection<double>&, const SnapshotFactor<double>&, const DmdOptions&,
+    const QuaternionMatrix<double>*);
 template PastSpectrum<double> past_spectrum(const SnapshotFactor<double>&, Eigen::Index);
 }  // namespace internal
 

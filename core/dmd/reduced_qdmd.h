@@ -107,19 +107,55 @@ std::optional<QuaternionModes<Real>> nearest_mode_of_projection(const Projection
   return result;
 }
 
-// All that is asked, from the Schur form of Q~ (Algorithm 2, step 3: Q~ W = W Lambda). Empty where
-// the eigenvalue iteration does not end.
+// Of each of the eigenvectors `wanted` of another operator in the same coordinates: which one of
+// `form` is most like it. None is taken twice.
 template <typename Real>
-std::optional<QuaternionModes<Real>> modes_from_schur_form(const Projection<Real>& projection,
-                                                           const SnapshotFactor<Real>& factor,
-                                                           const DmdOptions& options) {
+std::vector<Eigen::Index> most_like(const SchurForm<Real>& form, const SchurForm<Real>& other,
+                                    const std::vector<Eigen::Index>& wanted) {
+  const auto vector = [](const SchurForm<Real>& of, Eigen::Index k) {
+    return QuaternionMatrix<Real>(of.q * triangular_eigenvector(of.t, k));
+  };
+  std::vector<Eigen::Index> found;
+  for (const Eigen::Index k : wanted) {
+    const auto w = vector(other, k).conjugate_transpose();
+    Eigen::Index best = -1;
+    Real likeness = 0;
+    for (Eigen::Index j = 0; j < form.t.rows(); ++j) {
+      const auto v = vector(form, j);
+      const Real like = (w * v).norm() / v.norm();
+      if (std::find(found.begin(), found.end(), j) != found.end()) continue;
+      if (best >= 0 && !(like > likeness)) continue;
+      best = j;
+      likeness = like;
+    }
+    found.push_back(best);
+  }
+  return found;
+}
+
+// All that is asked, from the Schur form of Q~ (Algorithm 2, step 3: Q~ W = W Lambda). Empty where
+// the eigenvalue iteration does not end. decides: where given, the operator in the coordinates of
+// Q~ whose eigenvalues say which modes are background; those of Q~ that are most like them are.
+template <typename Real>
+std::optional<QuaternionModes<Real>> modes_from_schur_form(
+    const Projection<Real>& projection, const SnapshotFactor<Real>& factor,
+    const DmdOptions& options, const QuaternionMatrix<Real>* decides = nullptr) {
   const Eigen::Index m = factor.r.cols(), rank = projection.q_tilde.rows();
   const auto form = schur(projection.q_tilde);
   if (!form.converged) return std::nullopt;
   const ComplexVector<Real> eigenvalues = form.eigenvalues();
   Selection selection;
-  const auto chosen =
-      select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes, &selection);
+  std::vector<Eigen::Index> chosen;
+  if (decides) {
+    const auto deciding = schur(*decides);
+    if (!deciding.converged) return std::nullopt;
+    chosen = most_like(form, deciding,
+                       select_background<Real>(deciding.eigenvalues(), options.omega_threshold,
+                                               options.max_modes, &selection));
+  } else {
+    chosen = select_background<Real>(eigenvalues, options.omega_threshold, options.max_modes,
+                                     &selection);
+  }
   const auto coefficients = projection.coefficients * form.q;
 
   // Algorithm 2, step 4: Phi = Y V S^-1 W, kept as coefficients of the snapshots.
@@ -323,7 +359,8 @@ extern template QuaternionModes<double> reduced_qdmd(const SnapshotFactor<double
                                                      const DmdOptions&);
 namespace internal {
 extern template std::optional<QuaternionModes<double>> modes_from_schur_form(
-    const Projection<double>&, const SnapshotFactor<double>&, const DmdOptions&);
+    const Projection<double>&, const SnapshotFactor<double>&, const DmdOptions&,
+    const QuaternionMatrix<double>*);
 extern template PastSpectrum<double> past_spectrum(const SnapshotFactor<double>&, Eigen::Index);
 }  // namespace internal
 

@@ -47,7 +47,8 @@ bool BatchSchedule::take_in(const ImageView& frame) {
 // With the newest frame.
 void BatchSchedule::follow_scene() {
   Collection& window = *collection_;
-  switch (scene_seen()) {
+  const SceneSeen seen = scene_seen();
+  switch (seen) {
     case SceneSeen::same:
       // It was no disturbance: all frames that show it have the background of this window.
       if (window.scene && *window.scene < window.begin &&
@@ -57,6 +58,11 @@ void BatchSchedule::follow_scene() {
     case SceneSeen::another:
       window.scene = std::max(window.begin, taken() - Learner::kSceneFrames);
       window.scene_returns = false;
+      return;
+    case SceneSeen::other_colours:
+    case SceneSeen::earlier_colours:
+      if (!window.scene) window.scene = std::max(window.begin, taken() - steps::colour::kFrames);
+      window.scene_returns = seen == SceneSeen::earlier_colours;
       return;
     case SceneSeen::the_one_before:
       // Something disturbed the picture for a moment.

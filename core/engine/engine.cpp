@@ -26,7 +26,7 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   background_ = std::make_unique<Background>(
       std::move(learner),
       LearnerRoom{&frames_, options.window_size, plan_.models(), &workers_->pool(), &clock_},
-      options.colours, options.steps, options.levels);
+      options.colours, at_rate(options.steps, options.frame_rate), options.levels);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
     restorer_ = std::make_unique<Restorer>(width, height, options.depth);

@@ -207,6 +207,15 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
   return layout;
 }
 
+uint64_t EnginePlan::bytes_of_any_size() const {
+  EngineOptions options = options_;
+  options.team = nullptr;
+  options.max_memory = UINT64_MAX;
+  // Frames that arrive while a window is solved are left out where there is no room for them.
+  options.frame_rate = 0;
+  return std::min(EnginePlan(options, 1, 1).layout().bytes, layout_.bytes);
+}
+
 Status EnginePlan::check_memory() const {
   const std::string window = describe(options_, width_, height_);
   if (layout_.bytes == UINT64_MAX)
@@ -221,13 +230,19 @@ Status EnginePlan::check_memory() const {
                 std::to_string(solver) + " bytes and max-memory allows " +
                 std::to_string(options_.max_memory) +
                 ": use solver=gram, lower window-size, or scale the video down."};
-  if (layout_.bytes > options_.max_memory)
-    return {Status::Code::too_much_memory,
-            "A window-size of " + window + " needs " + std::to_string(layout_.bytes) + " bytes (" +
-                std::to_string(layout_.frame_bytes) + " for its frames) and max-memory allows " +
-                std::to_string(options_.max_memory) +
-                ": lower window-size, scale the video down, or raise max-memory."};
-  return {};
+  if (layout_.bytes <= options_.max_memory) return {};
+  const uint64_t any_size = bytes_of_any_size();
+  // Where frames are small, it is their number that counts.
+  const bool few_pixels = any_size > layout_.bytes / 2;
+  return {
+      Status::Code::too_much_memory,
+      "A window-size of " + window + " needs " + std::to_string(layout_.bytes) + " bytes (" +
+          std::to_string(layout_.frame_bytes) + " for its frames" +
+          (few_pixels ? ", " + std::to_string(any_size) + " to decompose so many frames of any size"
+                      : "") +
+          ") and max-memory allows " + std::to_string(options_.max_memory) +
+          ": lower window-size, " + (few_pixels ? "" : "scale the video down, ") +
+          "or raise max-memory."};
 }
 
 Status EnginePlan::alpha_refused(uint64_t store_bytes) const {

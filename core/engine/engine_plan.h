@@ -54,6 +54,8 @@ class EnginePlan {
 
  private:
   Status check_memory() const;
+  // What windows of so many frames take at least, however small frames are.
+  uint64_t bytes_of_any_size() const;
   EngineLayout layout_with(int late_frames) const;
 
   EngineOptions options_;

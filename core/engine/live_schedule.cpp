@@ -49,17 +49,22 @@ void LiveSchedule::follow_scene() {
   const SceneSeen seen = scene_seen();
   if (seen == SceneSeen::same) return;
   stop();
-  const bool returns = seen == SceneSeen::the_one_before && left_.has_value();
+  const bool returns = (seen == SceneSeen::the_one_before || seen == SceneSeen::earlier_colours) &&
+                       left_.has_value();
   Learnt before;
   // In its own light: that of the newest frames is another scene's.
   show_newest();
   background().remember(&before);
-  if (returns)
-    background().return_to(*left_);
+  Learnt recoloured;
+  if (seen == SceneSeen::other_colours) recoloured = before;
+  const bool goes_on =
+      seen == SceneSeen::other_colours && background().learner().recolour(&recoloured);
+  if (returns || goes_on)
+    background().return_to(goes_on ? recoloured : *left_);
   else
     background().begin_scene_at_once();
   left_ = std::move(before);
-  begin_window(returns);
+  begin_window(returns || goes_on);
 }
 
 // With the newest frame: what it shows is known, and the background is mended, but for one that was

@@ -132,7 +132,7 @@ class Schedule {
       seen = SceneSeen::another;
     else if (stage_.stabilizer && seen != SceneSeen::same)
       stage_.stabilizer->begin_scene();
-    scenes_ += seen == SceneSeen::same ? 0 : 1;
+    scenes_ += seen == SceneSeen::another || seen == SceneSeen::the_one_before ? 1 : 0;
     return seen;
   }
   // For work of a solve that is done at once.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/foreground/full_depth.h"
+#include "core/foreground/grey.h"
 #include "core/foreground/mask_runs.h"
 #include "core/foreground/vote.h"
 #include "core/passes/bands.h"
@@ -15,6 +16,7 @@
 #include "core/passes/residual.h"
 #include "core/passes/sampling.h"
 #include "core/passes/shading.h"
+#include "core/passes/unit_light.h"
 
 namespace qdmd {
 namespace {
@@ -135,7 +137,8 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
     : band_(band),
       shape_(width, band, steps.vote),
       steps_(steps),
-      knows_light_(steps.light && colours != Colours::grey),
+      colours_(colours),
+      grey_(colours == Colours::grey),
       texture_(width, band, steps.constants),
       noise_(width, band.rows(), steps.constants, band.first()),
       specks_(width, band.height()),
@@ -177,6 +180,7 @@ void Decision::forget() {
   texture_.forget();
   noise_.forget();
   frames_ = 0;
+  grey_ = colours_ == Colours::grey;
 }
 
 void Decision::change_scene(bool returns) {
@@ -204,11 +208,19 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   // Without limits of pixels, ghosts look like noise, and like textures.
   now_.means = steps_.smooth && !frame.fixed && frame.limits && frame.threshold > constants().noisy;
   now_.textures = steps_.texture && !frame.fixed && frame.limits;
+  const Gain& light = frame.model->shown_light();
+  now_.darker = std::any_of(light.begin(), light.end(), [](float gain) { return gain < 1; });
   now_.threshold =
       now_.means ? std::max(constants().least_of_means, frame.threshold / 3) : frame.threshold;
   now_.whole = frame.model->depth() > 8 && !now_.means;
+  // Noise is as much brighter as the light is; a little more is within the limits.
+  now_.light =
+      frame.fixed ? 1 : std::max(1.0f, 0.8f * (light[0] + light[1] + light[2]) / kChannels);
+  now_.threshold *= now_.light;
   now_.below = now_.whole && frame.fixed && now_.threshold < kCutLevels;
-  now_.level_known = std::exchange(picture_, frame.model->picture()) == frame.model->picture();
+  now_.level_known =
+      std::exchange(picture_, frame.model->picture()) == frame.model->picture() && !now_.darker;
+  if (now_.darker) picture_ = 0;
   look();
   // All are there now.
   now_.frame.rows = nullptr;
@@ -249,7 +261,16 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     in_rows([&](int first, int size) { learn(first, size); });
     noise_.end_frame();
   }
+  find_colour();
   ++frames_;
+}
+
+// All members must say the same of a picture that each of them has a part of: the format's colours.
+void Decision::find_colour() {
+  if (!band_.is_whole()) return;
+  const uint8_t* const x[3] = {now_.frame.x[0].high, now_.frame.x[1].high, now_.frame.x[2].high};
+  grey_ = is_grey(x, static_cast<size_t>(shape_.width), static_cast<size_t>(shape_.height),
+                  colours_, black_);
 }
 
 // A part of the mask may go on in other members' rows.
@@ -316,6 +337,20 @@ void Decision::look() {
   in_strips([&](int, int top, int count) { explain(top, count); });
 }
 
+// Where L is known from samples at the end of their range, it is at least so bright: what is
+// brighter in less light agrees.
+void Decision::raise_ends(size_t first, size_t count, uint8_t* const level[3]) const {
+  constexpr float kEnd = 253;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float least = kEnd * now_.frame.model->shown_light()[c];
+    if (least >= kEnd) continue;
+    const auto end = static_cast<uint8_t>(std::ceil(std::max(least, 1.0f)));
+    const uint8_t* const x = now_.frame.x[c].high + first;
+    for (size_t i = 0; i < count; ++i)
+      level[c][i] = level[c][i] >= end && x[i] > level[c][i] ? x[i] : level[c][i];
+  }
+}
+
 // L, and which pixels differ from it.
 void Decision::compare(int first_row, int row_count) {
   if (now_.frame.rows) now_.frame.rows->read(first_row, row_count);
@@ -326,6 +361,7 @@ void Decision::compare(int first_row, int row_count) {
       uint8_t* const level[3] = {level_row(0, y) + left, level_row(1, y) + left,
                                  level_row(2, y) + left};
       if (!now_.level_known) now_.frame.model->evaluate(first, count, level);
+      if (now_.darker) raise_ends(first, count, level);
       const uint8_t* const x[3] = {now_.frame.x[0].high + first, now_.frame.x[1].high + first,
                                    now_.frame.x[2].high + first};
       if (now_.whole)
@@ -474,7 +510,8 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     }
     p = end;
   }
-  if (knows_light_ && !now_.below && now_.frame.shadows != Shadows::foreground) leave_shadows(run);
+  if (steps_.light && !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground)
+    leave_shadows(run);
 }
 
 // Distances and limits of a run.
@@ -496,6 +533,8 @@ void Decision::look_at(Run* run) {
   std::copy_n(limits, count, run->limit);
   if (now_.means)
     for (size_t p = 0; p < count; ++p) run->limit[p] /= 3;
+  if (now_.light > 1)
+    for (size_t p = 0; p < count; ++p) run->limit[p] = in_light(run->limit[p], now_.light);
   for (size_t p = 0; p < count; ++p) run->limit[p] = std::max(run->limit[p], least);
 }
 

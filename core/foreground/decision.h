@@ -45,7 +45,8 @@ struct Comparison {
 };
 
 // A pixel that differs from L is foreground unless
-//   - it is L in another light (find_shaded; see Shadows; not in grey pictures),
+//   - it is L in another light (find_shaded; see Shadows; not in grey pictures: there the frame
+//     before had no colour),
 //   - it is hardly further from L than it is all the time (PixelNoise),
 //   - it is in a texture that moves (MovingTexture), and as near as ever to the background next to
 //     it,
@@ -127,7 +128,9 @@ class Decision {
     bool whole = false;  // own distances are of all bits, more than 8 (full_depth.h)
     bool below = false;  // pixels may differ that are the same in 8 bits
     double threshold = 0;
+    float light = 1;           // how much brighter the frame is than L in unit light, 1 at least
     bool level_known = false;  // L is still that of the frame before
+    bool darker = false;       // a channel has less light than L in unit light
   };
   // Pixels left .. left + count - 1 of a row.
   struct Run;
@@ -142,11 +145,13 @@ class Decision {
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
   void clear_marks();
   void share_mask();
+  void find_colour();
   // The mask's row y of those that are kept, or the picture's if there is none.
   const uint8_t* mask_row(int y) const;
   void look();
   // Steps of a frame; threads have rows of their own.
   void compare(int first_row, int row_count);
+  void raise_ends(size_t first, size_t count, uint8_t* const level[3]) const;
   void compare_means(int first_row, int row_count);
   void explain(int first_row, int row_count);
   void explain_run(int y, int left, int right, int grid_row);
@@ -162,7 +167,8 @@ class Decision {
   DecisionSteps steps_;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
   uint8_t black_[3];
-  bool knows_light_;
+  Colours colours_;
+  bool grey_ = false;  // the newest frame is
   MovingTexture texture_;
   PixelNoise noise_;
   struct Statistics {

@@ -65,4 +65,13 @@ struct DecisionSteps {
   DecisionConstants constants = {};
 };
 
+// The steps for frames that come at such a rate, in frames per second; 0: unknown. Where they are
+// far apart, as in a time lapse, most things that pass are in one frame: a moment says less of
+// noise, in proportion.
+inline DecisionSteps at_rate(DecisionSteps steps, double frame_rate) {
+  constexpr double kSlow = 5;
+  if (frame_rate > 0 && frame_rate < kSlow) steps.constants.weight_of_moments *= frame_rate / kSlow;
+  return steps;
+}
+
 }  // namespace qdmd

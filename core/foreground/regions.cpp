@@ -43,6 +43,11 @@ void merge_overlapping(std::vector<Region>* regions) {
   }
 }
 
+// Pixels that are less than this apart are near to each other.
+int reach_of(int width, int height) {
+  return 2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
+}
+
 // The largest first; of equals the one that begins further up, or further to the left.
 bool comes_before(const Region& a, const Region& b) {
   return std::tuple(-a.area, a.y, a.x) < std::tuple(-b.area, b.y, b.x);
@@ -67,6 +72,13 @@ struct Pixels {
 };
 
 }  // namespace
+
+bool is_strip_at_edge(const Region& r, int width, int height) {
+  const int reach = reach_of(width, height);
+  const bool left = r.x == 0, right = r.x + r.width == width;
+  const bool top = r.y == 0, bottom = r.y + r.height == height;
+  return (r.width < reach && left != right) || (r.height < reach && top != bottom);
+}
 
 struct RegionFinder::Memory {
   // Pixels of a row, from left to right, of which each is at most `reach` right of the one before.
@@ -126,8 +138,7 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
   if (!memory_) memory_ = std::make_unique<Memory>();
   auto& [stretches, rows, named, regions] = *memory_;
   stretches.clear(), rows.clear(), named.clear(), regions.clear();
-  const int reach =
-      2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
+  const int reach = reach_of(width, height);
   for (int y = 0; y < height; ++y) {
     const size_t first = static_cast<size_t>(y) * static_cast<size_t>(width);
     memory_->find_stretches(mask + first, residual ? residual + first : nullptr, width, y, reach);
@@ -151,6 +162,8 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
   if (regions.size() > kMostRegions) regions.resize(kMostRegions);
   if (apart) return regions;
   merge_overlapping(&regions);
+  if (least_area == 0)
+    std::erase_if(regions, [&](const Region& r) { return is_strip_at_edge(r, width, height); });
   std::sort(regions.begin(), regions.end(), comes_before);
   return regions;
 }

@@ -28,6 +28,8 @@ struct SolveFacts {
   int iterations = 1;
   // The model was not finite: the mean of the window's frames is in its place.
   bool replaced = false;
+  // A camera that starts has found its exposure, as far as the learner looks at that.
+  bool settled = true;
   // Seconds in the Gram matrix since the solve before, and in the solve.
   double gram_time = 0, solve_time = 0;
 };
@@ -40,8 +42,8 @@ enum class Models {
 };
 
 // What a camera shows: the scene of the background, another one, or the one that it showed before
-// that.
-enum class SceneSeen { same, another, the_one_before };
+// that; the same scene in other colours, or in those that it had before.
+enum class SceneSeen { same, another, the_one_before, other_colours, earlier_colours };
 
 // Where a learner works.
 struct LearnerRoom {
@@ -152,6 +154,9 @@ class Learner {
   // runs.
   // returns: it is the scene that was left last, and what was known of it is known again.
   virtual void begin_scene(bool /*returns*/) {}
+  // Where scene_of() said that the scene has other colours: gives `learnt` these. False, and
+  // changes nothing, where nobody knows them.
+  virtual bool recolour(Learnt* /*learnt*/) const { return false; }
 
   // ---- Light ----
 

@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "core/base/colours.h"
 #include "core/dmd/options.h"
 
 namespace qdmd {
@@ -21,7 +22,8 @@ struct LearnOptions {
   int sample_step = 0;
   // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
   bool remembers = true;
-  int depth = 8;  // bits of the frames' samples, 8 to 16
+  Colours colours = Colours::rgb;  // of the frames
+  int depth = 8;                   // bits of the frames' samples, 8 to 16
   // Pixels that share a sample of channels 1 and 2 in all frames, as in ChromaShape. 1: each has
   // its own, or frames differ, which takes more memory. Others than Y, U and V are not shared.
   int chroma_columns = 1, chroma_rows = 1;

@@ -169,6 +169,7 @@ void BackgroundModel::use_steady_weights(double t) {
 }
 
 void BackgroundModel::set_time(double t) {
+  shown_light_ = light(t);
   if (frozen_) {
     std::array<float, 9> weights = kIdentity;
     if (!gains_.empty()) {

@@ -57,6 +57,8 @@ class BackgroundModel {
   void set_light(const Gain& gain) { gains_.assign(1, gain); }
   // The gain at time t.
   Gain light(double t) const;
+  // That of the time that is set.
+  const Gain& shown_light() const { return shown_light_; }
 
   // Room for one limit for each pixel, in levels: the pixel is foreground if its residual exceeds
   // the limit and no threshold is set. Kept until begin().
@@ -137,6 +139,7 @@ class BackgroundModel {
 
   TemporalModel model_;
   Eigen::MatrixXd basis_, time_weights_, direct_weights_;
+  Gain shown_light_ = kSameLight;
   Eigen::MatrixXd steady_weights_;
   std::vector<float> single_weights_;  // of one time, as weights_
   Eigen::VectorXd largest_;            // that a picture has at a pixel, in levels: bounds

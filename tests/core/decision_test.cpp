@@ -442,6 +442,46 @@ TEST(Rehearsal, KnowsLeavesFromTheFirstFrameOnWhereMasksAreExpected) {
   EXPECT_LT(surprised.back(), 0.01);
 }
 
+// In a time lapse of a busy street, each thing is at its place in one frame only.
+TEST(TimeLapse, WhatPassesIsNoNoise) {
+  const auto seen_at = [](double frame_rate) {
+    std::mt19937 rng(329);
+    std::normal_distribution<double> noise(0, 2);
+    Planes street = floor_of(96, 64, rng);
+    EngineOptions options;
+    options.mode = Mode::live;
+    options.threads = 1;
+    options.stabilize = Stabilize::off;
+    options.frame_rate = frame_rate;
+    Engine engine;
+    EXPECT_TRUE(engine.configure(options, 96, 64).ok());
+    PackedPicture frame(96, 64, 3), mask(96, 64, 3);
+    size_t found = 0, all = 0;
+    for (int t = 0; t < 500; ++t) {
+      const size_t left = 20 + rng() % 40, top = 10 + rng() % 10;
+      for (size_t p = 0; p < frame.pixels(); ++p) {
+        const size_t x = p % 96, y = p / 96;
+        const bool thing = t >= 20 && x >= left && x < left + 10 && y >= top && y < top + 24;
+        for (size_t c = 0; c < 3; ++c) {
+          const double level = thing ? (c == 0 ? 150 : 60) : street.level[c][p];
+          frame.at(c, p) =
+              static_cast<uint8_t>(std::lround(std::clamp(level + noise(rng), 0.0, 255.0)));
+        }
+      }
+      EXPECT_TRUE(engine.push(frame.in()).ok());
+      engine.next()->pop(Output::mask, mask.out());
+      if (t < 300) continue;
+      for (size_t y = top; y < top + 24; ++y)
+        for (size_t x = left; x < left + 10; ++x, ++all) found += mask.at(0, y * 96 + x) > 0;
+    }
+    return static_cast<double>(found) / static_cast<double>(all);
+  };
+  const double lapse = seen_at(1), unknown = seen_at(0);
+  EXPECT_GT(lapse, 0.98);
+  EXPECT_LT(unknown, lapse - 0.01);  // There is something to mend.
+  EXPECT_EQ(unknown, seen_at(25));
+}
+
 TEST(LittleToSee, NoiseIsNoForeground) {
   std::mt19937 rng(327);
   for (double sigma : {1.0, 5.0, 12.0}) {

@@ -290,6 +290,25 @@ TEST(EngineStatus, RangesOfTheOptions) {
   EXPECT_EQ(configured([](Options&) {}, 1, 1), kOk);
 }
 
+// Of small frames, their number counts, and it does not help to scale them down.
+TEST(Memory, RefusalSaysWhatManySmallFramesTake) {
+  for (Method method : {Method::robust, Method::qdmd, Method::dmd})
+    for (Mode mode : {Mode::batch, Mode::live}) {
+      EngineOptions options;
+      options.method = method;
+      options.mode = mode;
+      options.window_size = 1000;
+      options.max_memory = 1;
+      options.frame_rate = 25;
+      const std::string small = EnginePlan(options, 8, 8).status().message;
+      EXPECT_NE(small.find(" to decompose so many frames of any size"), std::string::npos) << small;
+      EXPECT_EQ(small.find("scale the video down"), std::string::npos) << small;
+      const std::string large = EnginePlan(options, 1920, 1080).status().message;
+      EXPECT_EQ(large.find(" of any size"), std::string::npos) << large;
+      EXPECT_NE(large.find("scale the video down"), std::string::npos) << large;
+    }
+}
+
 TEST(EngineStatus, MemoryRefusalSaysWhatToChange) {
   auto options = window_of(50);
   const uint64_t needed = layout_of(options, 640, 480).bytes;

@@ -110,6 +110,58 @@ TEST(Estimator, OppositeModesAreNotMixed) {
   }
 }
 
+// Noise that is kept beside the background has eigenvalues of modulus 1 here, and is no background.
+TEST(Estimator, ForwardBackwardTakesNoNoiseForTheBackground) {
+  int roots = 0, windows = 0;
+  for (int seed = 0; seed < 6; ++seed)
+    for (const int rank : {2, 3, 5}) {
+      SCOPED_TRACE(std::to_string(seed) + ", rank " + std::to_string(rank));
+      std::mt19937 rng(static_cast<unsigned>(97 + seed));
+      const auto picture = random_picture(600, rng, 60, 200);
+      std::normal_distribution<double> noise(0, 1);
+      Clip clip(600, 40);
+      const auto truth = [&](size_t t, size_t p) {
+        return picture[p] * std::pow(0.98, static_cast<double>(t));
+      };
+      for (size_t t = 0; t < 40; ++t)
+        for (size_t p = 0; p < 600; ++p) {
+          const double grey = truth(t, p) + noise(rng);
+          for (size_t c = 0; c < 3; ++c) clip.set(t, c, p, grey);
+        }
+      DmdOptions options;
+      options.rank = rank;
+      const auto modes = solve(clip, options, Estimator::forward_backward);
+      ASSERT_EQ(modes.eigenvalues.size(), 1);
+      EXPECT_LE(std::abs(modes.eigenvalues(0) - 0.98), 0.002);
+      const auto background = background_at(to_quaternions(clip), modes, 20);
+      double error = 0;
+      for (Eigen::Index p = 0; p < 600; ++p)
+        error += std::abs(background.get(p, 0).x - truth(20, static_cast<size_t>(p))) / 600;
+      EXPECT_LT(error, 1);
+      ++windows;
+      // Where the root does not come, the summary says whose result it is.
+      if (modes.summary.estimator == Estimator::forward_backward) {
+        ++roots;
+      } else {
+        const auto exact = solve(clip, options, Estimator::exact);
+        EXPECT_EQ(modes.eigenvalues(0), exact.eigenvalues(0));
+        EXPECT_EQ(modes.summary.estimator, Estimator::exact);
+      }
+    }
+  // Both cases are looked at.
+  EXPECT_GT(roots, 0);
+  EXPECT_LT(roots, windows);
+}
+
+TEST(Estimator, SummaryNamesTheOneThatGaveTheResult) {
+  std::mt19937 rng(98);
+  const Clip clip = fading(0.99, 2, 200, 8, rng);
+  DmdOptions options;
+  options.rank = 1;
+  for (Estimator estimator : kEstimators)
+    EXPECT_EQ(solve(clip, options, estimator).summary.estimator, estimator);
+}
+
 // Nothing is left out there that they could make use of.
 TEST(Estimator, TwoAreThePapersAtFullRank) {
   std::mt19937 rng(96);

@@ -97,6 +97,34 @@ TEST(Regions, OverlappingBoxesAreMerged) {
   expect_box(regions[1], 250, 30, 20, 20);
 }
 
+// Something that comes in is a strip at first, which says little of it.
+TEST(Regions, StripsAlongAnEdgeAreLeftOut) {
+  for (const auto& [x, y, w, h] : {std::tuple{318, 100, 2, 30},
+                                   {0, 100, 4, 60},
+                                   {40, 0, 90, 2},
+                                   {40, 236, 90, 4},
+                                   {0, 0, 320, 3},
+                                   {0, 0, 3, 240}}) {
+    SCOPED_TRACE(testing::Message() << x << " " << y << " " << w << "x" << h);
+    Mask mask(320, 240);
+    mask.box(x, y, w, h, 90);
+    EXPECT_TRUE(mask.regions().empty());
+    EXPECT_EQ(mask.regions(4).size(), 1u);  // The user wants small ones.
+    // As narrow, but not at an edge; and at the edge, but wider.
+    Mask other(320, 240);
+    other.box(100, 20, std::min(w, 200), std::min(h, 200), 90);
+    EXPECT_EQ(other.regions().size(), 1u);
+    Mask wider(320, 240);
+    const int width = std::max(w, 10), height = std::max(h, 10);
+    wider.box(std::min(x, 320 - width), std::min(y, 240 - height), width, height, 90);
+    EXPECT_EQ(wider.regions().size(), 1u);
+  }
+  // A picture that is as narrow has two edges.
+  Mask narrow(2, 40);
+  narrow.box(0, 0, 2, 40, 90);
+  EXPECT_EQ(narrow.regions().size(), 1u);
+}
+
 TEST(Regions, SmallOnesAreLeftOut) {
   Mask mask(320, 240);
   mask.box(10, 10, 5, 5, 60);

@@ -327,7 +327,7 @@ TEST(LightOf, IsFollowedFromFrameToFrame) {
           frames.plane(t, c)[cell] = seen * truth.back();
         }
   }
-  const auto found = light_of(frames, kFrames);
+  const auto found = light_of(frames, kFrames).gains;
   for (size_t t = 0; t < kFrames; ++t)
     EXPECT_NEAR(found[t][1] / found[kFrames - 1][1], truth[t] / truth[kFrames - 1], 0.03) << t;
 }

@@ -246,10 +246,10 @@ TEST(LightOf, KnownGainsAreFound) {
       std::vector<Gain> truth(40, kSameLight);
       // A minority in another light.
       for (size_t t = 25; t < 37; ++t) truth[t] = {other, other, other};
-      expect_gains(light_of(lit_frames(grid, truth, box, 3), 40), truth);
+      expect_gains(light_of(lit_frames(grid, truth, box, 3), 40).gains, truth);
       // Half and half: no light is the usual one.
       for (size_t t = 20; t < 40; ++t) truth[t] = {other, other, other};
-      expect_gains(light_of(lit_frames(grid, truth, box, 4), 40), truth);
+      expect_gains(light_of(lit_frames(grid, truth, box, 4), 40).gains, truth);
     }
 }
 
@@ -257,7 +257,7 @@ TEST(LightOf, ColoursOfLightAreFound) {
   const Grid grid = grid_of(24, 24);
   std::vector<Gain> truth(30, kSameLight);
   for (size_t t = 18; t < 30; ++t) truth[t] = {0.85f, 0.75f, 0.65f};
-  expect_gains(light_of(lit_frames(grid, truth, 6, 9), 30), truth);
+  expect_gains(light_of(lit_frames(grid, truth, 6, 9), 30).gains, truth);
 }
 
 // Frames near the middle light are left to refine_gain(): they agree with it within its tolerance.
@@ -268,7 +268,7 @@ TEST(LightOf, AFadeIsFollowed) {
     const float gain = 1 - 0.4f * static_cast<float>(t) / 59;
     truth.push_back({gain, gain, gain});
   }
-  const auto found = light_of(lit_frames(grid, truth, 7, 11), 60);
+  const auto found = light_of(lit_frames(grid, truth, 7, 11), 60).gains;
   // The light of what was left as it is.
   double base = 0;
   int unlit = 0;
@@ -285,14 +285,15 @@ TEST(LightOf, SmallChangesAreNoise) {
   std::normal_distribution<float> flicker(0, 0.01f);
   std::vector<Gain> truth(30);
   for (Gain& gain : truth) gain.fill(1 + flicker(rng));
-  for (const Gain& gain : light_of(lit_frames(grid, truth, 6, 13), 30)) EXPECT_FALSE(is_lit(gain));
+  for (const Gain& gain : light_of(lit_frames(grid, truth, 6, 13), 30).gains)
+    EXPECT_FALSE(is_lit(gain));
 }
 
 TEST(LightOf, WhatMovesIsNoLight) {
   std::mt19937 rng(14);
   const Grid grid = grid_of(20, 30);
   for (float high : {120.0f, 250.0f})
-    for (const Gain& gain : light_of(random_frames(grid, 30, 10, high, rng), 30))
+    for (const Gain& gain : light_of(random_frames(grid, 30, 10, high, rng), 30).gains)
       EXPECT_FALSE(is_lit(gain));
   // A wide texture that pans.
   const Grid wide = grid_of(20, 300);
@@ -302,7 +303,7 @@ TEST(LightOf, WhatMovesIsNoLight) {
     for (int c = 0; c < kChannels; ++c)
       for (int y = 0; y < 20; ++y)
         std::copy_n(texture.plane(0, c) + y * 300 + 5 * t, 30, pan.plane(t, c) + y * 30);
-  for (const Gain& gain : light_of(pan, 40)) EXPECT_FALSE(is_lit(gain));
+  for (const Gain& gain : light_of(pan, 40).gains) EXPECT_FALSE(is_lit(gain));
 }
 
 TEST(LightOf, NothingToSeeIsTheSameLight) {
@@ -312,7 +313,7 @@ TEST(LightOf, NothingToSeeIsTheSameLight) {
       GridFrames frames(grid, count);
       for (int t = 0; t < count; ++t)
         for (int c = 0; c < kChannels; ++c) std::fill_n(frames.plane(t, c), grid.cells(), level);
-      for (const Gain& gain : light_of(frames, count)) EXPECT_EQ(gain, kSameLight);
+      for (const Gain& gain : light_of(frames, count).gains) EXPECT_EQ(gain, kSameLight);
     }
 }
 

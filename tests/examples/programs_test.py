@@ -15,8 +15,8 @@ import common
 
 # demo.sh installs packages and builds: continuous integration runs it after these tests.
 # subtract.cpp is built and run by tests/install, archive by tests/archive.
-KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'meson.build', 'pipelines.md', 'record.py', 'recorder.py', 'subtract.cpp',
-         'two_pads.cpp', 'watch.py'}
+KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'frames.py', 'meson.build', 'pipelines.md', 'record.py', 'recorder.py',
+         'subtract.cpp', 'two_pads.cpp', 'watch.py'}
 WIDTH, HEIGHT = 320, 240
 
 root, embed, demo, two_pads = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
@@ -83,6 +83,14 @@ def two_pads_film(folder):
     assert said.count('foreground') > 100, said
     _, errors = run(folder, two_pads, 'missing.avi', expect=1)
     assert 'missing.avi' in errors, errors
+
+
+def frames_with_a_gap(folder):
+    for arguments in ((), ('--gap',)):
+        said, _ = run(folder, examples / 'frames.py', *arguments)
+        match = re.fullmatch(r'150 masks, ([\d.]+) % foreground\n', said)
+        # The square is 4.7 % of the picture.
+        assert match and 4 < float(match[1]) < 6, said
 
 
 def watch_simulated(folder):
@@ -185,7 +193,7 @@ def messages_as_documented(folder):
         'qdmdscenesrc num-buffers=30 ! qdmdbackground window-size=10 post-messages=true ! fakesink')
     pipeline.set_state(common.Gst.State.PLAYING)
     names = {'guint64': 'uint64', 'guint': 'uint', 'gdouble': 'double',
-             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum'}
+             'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum', 'GstQdmdBackgroundEstimator': 'enum'}
     try:
         for _ in range(3):
             message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,
@@ -203,7 +211,7 @@ def messages_as_documented(folder):
 
 
 def main():
-    checks = [all_are_known, embed_simulated, embed_film, embed_errors, watch_simulated, watch_film,
+    checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
               watch_errors, record_events, record_motion, record_nothing, record_errors, messages_as_documented,
               two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:

@@ -367,38 +367,77 @@ class EngineTrial {
   bool kept_ = false;    // no frame may be lost by what is called now
 };
 
+// Takes all that the library says of the frames that are ready.
+void take_from(library::Separator* separator, const library::Layout& layout, fuzz::Bytes* bytes) {
+  for (; separator->ready(); separator->skip()) {
+    std::vector<uint8_t> picture(static_cast<size_t>(layout.height) *
+                                 static_cast<size_t>(layout.row_bytes));
+    separator->write(static_cast<library::Output>(bytes->below(4)), layout, picture.data());
+    if (bytes->once_in(3))
+      for (const library::Region& region : separator->regions(bytes->below(4)))
+        QDMD_DEMAND(region.x >= 0 && region.x + region.width <= layout.width && region.y >= 0 &&
+                    region.y + region.height <= layout.height && region.area > 0);
+  }
+}
+
 void try_library(fuzz::Bytes* bytes) {
   library::Options options;
   const bool sane = !bytes->once_in(8);
   options.method = static_cast<library::Method>(bytes->below(3));
+  options.mode = static_cast<library::Mode>(bytes->below(2));
   options.window_size = sane ? bytes->from(2, 6) : bytes->any_int();
   options.hop_size = sane ? bytes->below(3) : bytes->any_int();
-  options.stabilize = bytes->once_in(2);
+  options.stabilize = static_cast<library::Stabilize>(bytes->below(3));
+  options.shadows = static_cast<library::Shadows>(bytes->below(3));
+  options.mask_softness = bytes->once_in(4) ? bytes->below(20) : 0;
   options.foreground_threshold = sane ? bytes->byte() : bytes->any_double();
   options.absorb_frames = sane ? bytes->byte() : bytes->any_int();
   options.threads = sane ? 1 : std::min(bytes->any_int(), 3);
+  const bool hard = options.mask_softness == 0 && options.shadows != library::Shadows::marked;
   try {
     library::Separator separator(options);
     // Few are enough, and an eighth of the inputs may not take most of the time.
     int left = 16;
     for (int t = 0; left > 0 && !bytes->empty(); ++t) {
-      library::Layout layout{bytes->from(1, 8), bytes->from(1, 8), 0, bytes->once_in(2)};
+      library::Layout layout{bytes->from(1, 8), bytes->from(1, 8), 0,
+                             static_cast<library::Pixels>(bytes->below(5)),
+                             bytes->once_in(4) ? bytes->from(9, 16) : 8};
       if (bytes->once_in(12)) layout.width = -bytes->below(3);
       const int padding = bytes->below(5);
-      layout.row_bytes = 3 * std::max(layout.width, 0) + padding;
+      constexpr int kSamples[] = {1, 3, 3, 4, 4};
+      layout.row_bytes = kSamples[static_cast<int>(layout.pixels)] * std::max(layout.width, 0) *
+                             (layout.depth > 8 ? 2 : 1) +
+                         padding;
+      if (bytes->once_in(20)) layout.row_bytes -= bytes->below(9);
       const auto rows = static_cast<size_t>(layout.height);
-      const auto row_bytes = static_cast<size_t>(layout.row_bytes);
+      const auto row_bytes = static_cast<size_t>(std::max<ptrdiff_t>(layout.row_bytes, 0));
+      const auto width = static_cast<size_t>(std::max(layout.width, 0)), mask_row = width + 3;
       // Frames of one size come one after the other.
       for (int frames = bytes->from(1, 6); frames > 0 && left > 0; --frames, --left) {
-        std::vector<uint8_t> picture(rows * row_bytes), mask(rows * row_bytes);
+        std::vector<uint8_t> picture(rows * row_bytes), mask(rows * mask_row);
         paint(bytes, t, &picture);
         if (bytes->once_in(12)) separator.freeze(bytes->once_in(2));
-        separator.apply(picture.data(), layout, mask.data(), layout.row_bytes);
-        for (size_t y = 0; y < rows; ++y)
-          for (size_t x = 0; x < row_bytes; ++x)
-            QDMD_DEMAND(mask[y * row_bytes + x] == 0 ||
-                        (mask[y * row_bytes + x] == 255 && x < static_cast<size_t>(layout.width)));
-        if (bytes->once_in(4)) QDMD_DEMAND(separator.background(layout, picture.data()));
+        if (bytes->once_in(12)) separator.ignore({{bytes->below(9) - 3, 0, 3, 4}});
+        if (bytes->once_in(24)) separator.reset();
+        if (options.mode == library::Mode::batch || bytes->once_in(3)) {
+          separator.push(picture.data(), layout);
+          take_from(&separator, layout, bytes);
+          if (bytes->once_in(6)) separator.drain();
+          take_from(&separator, layout, bytes);
+        } else {
+          separator.apply(picture.data(), layout, mask.data(), static_cast<ptrdiff_t>(mask_row));
+          for (size_t y = 0; y < rows; ++y)
+            for (size_t x = 0; x < mask_row; ++x) {
+              const uint8_t value = mask[y * mask_row + x];
+              QDMD_DEMAND(x < width ? !hard || value == 0 || value == 255 : value == 0);
+            }
+          if (bytes->once_in(4)) QDMD_DEMAND(separator.background(layout, picture.data()));
+        }
+        if (bytes->once_in(8)) {
+          const std::vector<uint8_t> saved = separator.save();
+          if (!saved.empty()) separator.load(saved.data(), saved.size());
+          take_from(&separator, layout, bytes);
+        }
       }
     }
   } catch (const std::invalid_argument& refused) {

@@ -226,6 +226,31 @@ TEST(LongGap, SendsFramesThatWait) {
 }
 
 // A picture every ten seconds that calls itself 25 a second has windows, and a latency, too.
+// Frames of fast-forward, and those of which only key units come, are further apart than the caps
+// say: nobody is told to mend the framerate.
+TEST(Playback, FastForwardAndKeyUnitsAreNoReasonToWarn) {
+  for (const std::string& mode : kModes)
+    for (const double rate : {1.0, 8.0, -4.0})
+      for (const guint flags :
+           {0u, guint(GST_SEGMENT_FLAG_TRICKMODE), guint(GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS)}) {
+        SCOPED_TRACE(mode + " " + std::to_string(rate) + " " + std::to_string(flags));
+        Masks masks(mode);
+        Element element(masks.stream());
+        GstSegment segment;
+        gst_segment_init(&segment, GST_FORMAT_TIME);
+        segment.rate = rate;
+        segment.flags = GstSegmentFlags(flags);
+        segment.stop = 200 * GST_SECOND;
+        masks.send(gst_event_new_segment(&segment));
+        for (int t = 0; t < 30; ++t) {
+          const auto apart = static_cast<GstClockTime>(2 * t) * GST_SECOND;
+          masks.push(t, street(1000, 1000), rate < 0 ? 100 * GST_SECOND - apart : apart);
+        }
+        EXPECT_EQ(30u, masks.take().size());
+        EXPECT_EQ("", element.warning());
+      }
+}
+
 TEST(Framerate, ThatIsNotTrueFormsWindowsAllTheSame) {
   Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, 16, 16);
   Element element(stream);

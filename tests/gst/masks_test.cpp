@@ -102,6 +102,34 @@ TEST(Ignore, SaysWhatItLeavesOutOnceItStarts) {
   EXPECT_NE(std::string::npos, element.warning().find("leaves out 1 rectangle"));
 }
 
+TEST(Ignore, SaysWhatIsOutsideOfThePicture) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
+  Element element(stream);
+  const auto warning_of = [&](const std::string& rectangles) {
+    set_from_text(element.get(), rectangles.c_str());
+    EXPECT_EQ("", element.warning());  // Frames may be of any size.
+    stream.push_many(0, 2);
+    return element.warning();
+  };
+  const std::string size = std::to_string(kWidth) + "x" + std::to_string(kHeight);
+  EXPECT_EQ("", warning_of("<<0,0,1,1>,<-5,-5,6,6>>"));
+  const std::string right = "<" + std::to_string(kWidth) + ",0,9,9>";
+  const std::string text =
+      warning_of("<" + right + ",<0,0,1,1>,<-5,3,5,9>,<0," + std::to_string(kHeight) + ",1,1>>");
+  EXPECT_NE(std::string::npos, text.find("3 rectangles outside")) << text;
+  EXPECT_NE(std::string::npos, text.find(size)) << text;
+  // It says so once.
+  stream.push_many(2, 4);
+  EXPECT_EQ("", element.warning());
+  // In a smaller picture more is outside.
+  set_from_text(element.get(), "<<40,0,5,5>>");
+  stream.push_many(6, 1);
+  EXPECT_EQ("", element.warning());
+  stream.set_caps(GST_VIDEO_FORMAT_RGB, 32, 24);
+  stream.push_many(7, 1);
+  EXPECT_NE(std::string::npos, element.warning().find("1 rectangles outside"));
+}
+
 TEST(Ignore, LeavesOutWhatIsNoRectangleAndSaysSo) {
   Stream stream("qdmdbackground", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);

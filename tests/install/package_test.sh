@@ -18,6 +18,8 @@ folder=usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)/gstreamer-1.0
 package_of_build() {
   mkdir -p "debian/tmp/$folder"
   cp "$build"/gst/*.so "debian/tmp/$folder"
+  mkdir -p debian/tmp/usr/share/metainfo
+  cp "$source"/gst/*.metainfo.xml debian/tmp/usr/share/metainfo
   dh_install
   dh_missing
   dh_installdocs
@@ -55,6 +57,7 @@ dpkg-deb --field "$scene" Depends | grep -q libopencv-imgcodecs
 diff <(find "$work/root" ! -type d -printf '%P\n' | sort) <(sort <<EOF
 $folder/libgstqdmd.so
 $folder/libgstqdmdscene.so
+usr/share/metainfo/org.example.gst_qdmd.metainfo.xml
 usr/share/doc/gstreamer1.0-qdmd/changelog.gz
 usr/share/doc/gstreamer1.0-qdmd/copyright
 usr/share/doc/gstreamer1.0-qdmd-scene/changelog.gz

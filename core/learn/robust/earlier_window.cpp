@@ -45,6 +45,13 @@ void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
   known_ = true;
 }
 
+void EarlierWindow::recolour(const Grid& grid, const ColourMap& map) {
+  uint8_t* const level[kChannels] = {level_[0].data(), level_[1].data(), level_[2].data()};
+  qdmd::recolour(map, level_[0].size(), level);
+  for (size_t c = 0; c < kChannels; ++c)
+    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+}
+
 void EarlierWindow::write(const Grid& grid, Learnt::EarlierWindow* out) const {
   for (size_t c = 0; c < kChannels; ++c) out->level[c] = level_[c];
   out->spread = spread_;

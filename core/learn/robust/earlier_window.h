@@ -1,6 +1,7 @@
 // What a window leaves to the next: its background, and how sure it was.
 #pragma once
 
+#include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/median_picture.h"
 #include "core/model/learnt.h"
 #include "core/passes/mask.h"
@@ -34,6 +35,9 @@ class EarlierWindow {
   void take(const Grid& grid, const ReferencePicture& background,
             const std::vector<uint8_t>& spread, const GridFrames& cells, int at,
             const StableFrames& stable, int count, float fresh, const std::vector<uint8_t>& held);
+
+  // Its background in other colours.
+  void recolour(const Grid& grid, const ColourMap& map);
 
   // What is known, for a file and back; its grid may be another, and each cell then knows what the
   // one at its middle did. Where read() throws, all is as it was.

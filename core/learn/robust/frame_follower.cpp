@@ -18,6 +18,7 @@ void FrameFollower::begin() {
   const Grid& grid = context_.grid;
   const Models models = context_.room.models;
   background_cells_ = GridFrames(grid, 2);
+  unclipped_ = GridFrames(grid, 1);
   light_scratch_ = LightScratch(grid.cells());
   // Frames that wait can wait for a proof.
   if (context_.follows(models))
@@ -29,7 +30,7 @@ void FrameFollower::begin() {
 
 uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
   const Grid& grid = context.grid;
-  return GridFrames::bytes(grid, 2) + LightScratch::bytes(grid.cells()) +
+  return GridFrames::bytes(grid, 3) + LightScratch::bytes(grid.cells()) +
          (context.follows(models) ? SceneMemory::bytes(grid) : 0) +
          (models == Models::two_of_live ? 0 : StandingLooks::bytes(grid)) +
          HistoryStarts::bytes(grid.cells()) + SceneWatch::bytes(grid);
@@ -41,7 +42,11 @@ void FrameFollower::forget() {
   absorbed_.forget();
   uncovered_.forget();
   scene_.forget();
-  other_scene_ = scene_begins_ = false;
+  exposure_.forget();
+  other_scene_ = scene_begins_ = colours_begin_ = false;
+  other_coloured_ = 0;
+  new_colours_.reset();
+  left_colours_.reset();
   calm_ = 0;
 }
 
@@ -50,6 +55,7 @@ void FrameFollower::publish(bool whole) {
   calm_ = whole && is_calm() ? calm_ + 1 : 0;
   published_ = 1 - published_;
   if (!std::exchange(scene_begins_, false)) return;
+  colours_begin_ = false;
   looks_.forget();
   if (context_.room.models != Models::two_of_live) memory_.forget();
   other_scene_ = false;
@@ -71,6 +77,20 @@ bool FrameFollower::is_calm() const {
   return sum < kCalmMean * cells && static_cast<double>(moved) < kMostMoved * cells;
 }
 
+// The cells of a frame; where its light is another one, without what samples at the end of their
+// range hide.
+FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light) {
+  const Cells shown(context_.room.frames->cells(), slot);
+  if (!is_lit(light)) return shown;
+  const Cells background = this->background();
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
+    const auto found = unclipped(shown.at(cell), background.at(cell), light);
+    for (size_t c = 0; c < kChannels; ++c)
+      unclipped_.plane(0, static_cast<int>(c))[cell] = found[c];
+  }
+  return {unclipped_, 0};
+}
+
 SceneSeen FrameFollower::scene_of(int slot) {
   if (other_scene_ && scene_begins_) return SceneSeen::same;
   const GridFrames& cells = context_.room.frames->cells();
@@ -82,10 +102,35 @@ SceneSeen FrameFollower::scene_of(int slot) {
     other_scene_ = false;
     return SceneSeen::the_one_before;
   }
+  if (colours_begin_) return SceneSeen::same;
   const SceneSeen seen = scene_.follow(frame, background);
   other_scene_ = seen != SceneSeen::same;
-  if (other_scene_) scene_.leave();
+  if (!other_scene_) return colours_of(frame);
+  scene_.leave();
+  left_colours_.reset();
   return seen;
+}
+
+// The same contours: a camera switches to infra-red, or back.
+SceneSeen FrameFollower::colours_of(const Cells& frame) {
+  const size_t cells = context_.grid.cells();
+  const Cells background = this->background();
+  const Colours colours = context_.options.colours;
+  const Colouring now = colouring_of(frame, cells, colours),
+                  known = colouring_of(background, cells, colours);
+  const bool other = scene_.shows_background() && now != known && now != Colouring::little &&
+                     known != Colouring::little;
+  other_coloured_ = other ? other_coloured_ + 1 : 0;
+  if (other_coloured_ < steps::colour::kFrames) return SceneSeen::same;
+  const bool returns = left_colours_ == now;
+  // Nobody knows which colours a grey scene has.
+  new_colours_.reset();
+  if (now == Colouring::none) new_colours_ = find_colour_map(frame, background, cells);
+  if (!returns && now == Colouring::none && !new_colours_) return SceneSeen::same;
+  other_coloured_ = 0;
+  colours_begin_ = true;
+  left_colours_ = known;
+  return returns ? SceneSeen::earlier_colours : SceneSeen::other_colours;
 }
 
 void FrameFollower::begin_scene() {

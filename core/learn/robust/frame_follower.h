@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/learn/robust/colour_map.h"
+#include "core/learn/robust/exposure_watch.h"
 #include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/light.h"
@@ -35,6 +38,10 @@ class FrameFollower {
   void read(const LearntEarlier& from);
   // The background in use is this picture now.
   void follow(const std::vector<uint8_t> level[kChannels]);
+  // While a camera that starts looks for its exposure, nothing that it shows is known for sure.
+  bool settled() const { return exposure_.settled(); }
+  // True once, when that is over.
+  bool has_found_exposure() { return exposure_.has_found(); }
   // Solves are told what is known.
   void tell(SolveHistory* history) { history->take(&absorbed_, &memory_); }
   // Learner::enough().
@@ -47,6 +54,9 @@ class FrameFollower {
   void set_absorb_frames(int64_t frames) { absorb_frames_ = frames; }
   SceneSeen scene_of(int slot);
   void begin_scene();
+  // What makes the background's colours those of the newest frames, after scene_of() said that they
+  // are others; null: nobody knows.
+  const ColourMap* new_colours() const { return new_colours_ ? &*new_colours_ : nullptr; }
   Gain light(int slot) {
     return light_over(context_.room.frames->cells(), slot, background_cells_, published_,
                       &light_scratch_);
@@ -71,10 +81,15 @@ class FrameFollower {
     Cells(const GridFrames& cells, int at)
         : of{cells.plane(at, 0), cells.plane(at, 1), cells.plane(at, 2)} {}
     operator const float* const*() const { return of; }
+    std::array<float, kChannels> at(size_t cell) const {
+      return {of[0][cell], of[1][cell], of[2][cell]};
+    }
   };
   Cells background() const { return {background_cells_, published_}; }
+  Cells unclipped_cells(int slot, const Gain& light);
   bool is_calm() const;
   void note_uncovered(const std::vector<int>& cells, const StandingLooks& looks, int64_t number);
+  SceneSeen colours_of(const Cells& frame);
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
                        const BackgroundModel* of_window);
   void mend_uncovered(std::vector<int> cells, const StandingLooks& looks,
@@ -89,6 +104,7 @@ class FrameFollower {
 
   const RobustContext& context_;
   GridFrames background_cells_;
+  GridFrames unclipped_;  // of a frame
   int published_ = 0;
   LightScratch light_scratch_;
   SceneMemory memory_;   // what frames that came showed
@@ -97,8 +113,15 @@ class FrameFollower {
   UncoveredPlaces uncovered_;
   int64_t absorb_frames_ = 0;
   SceneWatch scene_;
+  ExposureWatch exposure_;
   // Solves in a row that changed little, since a cell was mended.
   int calm_ = 0;
+  // In other colours: frames in a row; until the background in use has them, too; and the colours
+  // that are known to have been left.
+  int other_coloured_ = 0;
+  bool colours_begin_ = false;
+  std::optional<ColourMap> new_colours_;
+  std::optional<Colouring> left_colours_;
   // Another scene was seen; and solves know of it, but no background yet.
   bool other_scene_ = false, scene_begins_ = false;
 };

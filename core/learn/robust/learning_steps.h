@@ -23,6 +23,26 @@ namespace light {
 QDMD_STEP float kAgree = step("light.agree", 4.0f);
 // Levels: cells too dark or too bright have no ratio.
 QDMD_STEP float kDark = step("light.dark", 8.0f), kBright = step("light.bright", 250.0f);
+// Levels: the mean of a cell whose samples are mostly at the end of their range, and say no more
+// than "at least"; brighter cells than the second may have such samples. Where so large a share of
+// a frame's cells is at the end, gains are those of the darker ones.
+QDMD_STEP float kAtEnd = step("light.at_end", 245.0f), kNearEnd = step("light.near_end", 200.0f);
+QDMD_STEP float kEnds = step("light.ends", 0.01f);
+// Levels: darker channels of cells are measured then.
+QDMD_STEP float kMeasured = step("light.measured", 240.0f);
+// A window whose light changes by this factor while samples are at the end of their range is looked
+// at in the light of its darker frames: where this share of them is darker, and no darker than this
+// share of the usual light.
+QDMD_STEP float kSwings = step("light.swings", 1.08f), kDarker = step("light.darker", 0.1f);
+QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
+// Levels: a channel that is further from the background says that something else is there.
+QDMD_STEP float kOther = step("light.other", 20.0f);
+// Levels: a darker frame that is so near to the darkest ones' median, a channel's mean, shows the
+// same.
+QDMD_STEP float kNearMedian = step("light.near_median", 8.0f);
+// Frames that say what is behind such samples: the darkest one in so many, but so many at least.
+QDMD_STEP size_t kDarkOf = step("light.dark_of", size_t{6});
+QDMD_STEP size_t kLeastDark = step("light.least_dark", size_t{5});
 // A gain must make this many times as many cells agree, and this share of all cells besides.
 QDMD_STEP float kGrowth = step("light.growth", 1.3f), kShare = step("light.share", 0.1f);
 // Frames are divided by gains: the least one.
@@ -40,6 +60,30 @@ QDMD_STEP float kBin = step("light.bin", 0.02f), kNear = step("light.near", 0.05
 // Cells: fewer that have a ratio say nothing.
 QDMD_STEP size_t kLeastRatios = step("light.least_ratios", size_t{16});
 }  // namespace light
+
+// ---- Other colours: a camera that switches to infra-red ----
+namespace colour {
+// A picture has no colour where the mean distance of its channels is less than this share of its
+// level, and some where it is more than the second.
+QDMD_STEP double kNone = step("colour.none", 0.025), kSome = step("colour.some", 0.07);
+// A linear map explains the change where this share of the cells is within so many levels of it, a
+// channel's mean. It is fitted so often, to those of the time before.
+QDMD_STEP double kFits = step("colour.fits", 0.7);
+QDMD_STEP float kExplained = step("colour.explained", 10.0f);
+QDMD_STEP int kRounds = step("colour.rounds", 4);
+// Frames in a row that are in other colours.
+QDMD_STEP int kFrames = step("colour.frames", 1);
+}  // namespace colour
+
+// ---- The exposure of a camera that starts ----
+namespace exposure {
+// It has settled once the mean of frames stays within this share for so many of them, and is no
+// darker than so many levels; or after so many frames.
+constexpr int kFrames = 10;
+QDMD_STEP double kRests = step("exposure.rests", 0.03);
+QDMD_STEP double kDark = step("exposure.dark", 12.0);
+QDMD_STEP int kLongest = step("exposure.longest", 375);
+}  // namespace exposure
 
 // ---- Contours: two looks of a region are told apart by the edges around it ----
 namespace contours {
@@ -112,6 +156,8 @@ QDMD_STEP size_t kLeastNews = step("looks.least_news", size_t{18});
 
 // ---- Proofs: what stands there came, or was uncovered ----
 namespace proofs {
+// Frames from one judgement of what nobody has judged yet to the next: contours take time.
+QDMD_STEP int64_t kEvery = step("proofs.every", int64_t{2});
 // Frames before and after a change in which things arrive or go away.
 QDMD_STEP int64_t kMoves = step("proofs.moves", int64_t{20});
 // Frames: something else may hide a piece of what left for so long.

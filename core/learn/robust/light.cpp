@@ -23,34 +23,63 @@ float gray(const float* const planes[3], size_t cell) {
   return (planes[0][cell] + planes[1][cell] + planes[2][cell]) / 3;
 }
 
-// Share of cells where frame / gain and reference agree.
+// The brightest channel of a cell.
+float brightest(const float* const planes[3], size_t cell) {
+  return std::max({planes[0][cell], planes[1][cell], planes[2][cell]});
+}
+
+// Share of cells where frame / gain and reference agree, of those that no sample at the end of its
+// range says too little of.
 float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
                 const Gain& gain) {
-  size_t agree = 0;
+  size_t agree = 0, seen = 0;
   for (size_t cell = 0; cell < cells; ++cell) {
     float difference = 0;
-    for (size_t c = 0; c < kChannels; ++c)
-      difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
+    size_t at_end = 0;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const bool says = frame[c][cell] < kAtEnd && reference[c][cell] < kAtEnd;
+      at_end += !says;
+      if (says) difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
+    }
+    if (at_end == kChannels) continue;
+    ++seen;
     if (difference < 3 * kAgree) ++agree;
   }
-  return static_cast<float>(agree) / static_cast<float>(cells);
+  // Where all is white, nothing is known.
+  return seen < kLeastRatios ? 1 : static_cast<float>(agree) / static_cast<float>(seen);
+}
+
+// The share of cells with samples at the end of their range.
+float share_at_end(const float* const frame[3], size_t cells) {
+  size_t found = 0;
+  for (size_t cell = 0; cell < cells; ++cell) found += brightest(frame, cell) >= kAtEnd;
+  return static_cast<float>(found) / static_cast<float>(cells);
 }
 
 // The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
+// 1 without a look at these, where that mode is nearer to 1 than `still`, a logarithm.
 Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells,
-                 LightScratch* scratch) {
+                 LightScratch* scratch, float still = 0) {
   constexpr int kBins = 300;
   constexpr float kLowest = -3;
   std::array<int, kBins + 4> histogram{};
   auto& ratios = scratch->ratios;
   ratios.clear();
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const float f = gray(frame, cell), r = gray(reference, cell);
-    if (f <= kDark || r <= kDark || f >= kBright || r >= kBright) continue;
+  const auto see = [&](float f, float r, size_t cell, float bright) {
+    if (f <= kDark || r <= kDark || f >= bright || r >= bright) return;
     const float ratio = std::log(f / r);
     ratios.emplace_back(ratio, cell);
     const int bin = static_cast<int>((ratio - kLowest) / kBin);
     if (bin >= 0 && bin < kBins) ++histogram[static_cast<size_t>(bin) + 2];
+  };
+  // Where samples are at the end of their range, other channels of a cell still say something.
+  const bool clips = share_at_end(frame, cells) > kEnds || share_at_end(reference, cells) > kEnds;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    if (!clips) {
+      see(gray(frame, cell), gray(reference, cell), cell, kBright);
+      continue;
+    }
+    for (size_t c = 0; c < kChannels; ++c) see(frame[c][cell], reference[c][cell], cell, kMeasured);
   }
   if (ratios.size() < kLeastRatios) return kSameLight;
   int best = 0, most = -1;
@@ -60,12 +89,14 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
     if (smooth > most) most = smooth, best = bin;
   }
   const float mode = kLowest + (static_cast<float>(best) + 0.5f) * kBin;
+  if (std::abs(mode) < still) return kSameLight;
   Gain gain = kSameLight;
   auto& near = scratch->near;
   for (size_t c = 0; c < kChannels; ++c) {
     near.clear();
     for (const auto& [ratio, cell] : ratios)
-      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark)
+      if (std::abs(ratio - mode) < kNear && reference[c][cell] > kDark &&
+          !(clips && std::max(frame[c][cell], reference[c][cell]) >= kMeasured))
         near.push_back(frame[c][cell] / reference[c][cell]);
     // A channel that is dark everywhere: the light of the others.
     gain[c] = near.empty() ? std::exp(mode) : std::max(median(&near), kLeastGain);
@@ -83,11 +114,11 @@ struct CellPlanes {
 };
 
 Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
-               LightScratch* scratch) {
+               LightScratch* scratch, float still = 0) {
   const float before = agreement(frame.of, background.of, cells, kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
-  const Gain gain = shared_gain(frame.of, background.of, cells, scratch);
+  const Gain gain = shared_gain(frame.of, background.of, cells, scratch, still);
   const float after = agreement(frame.of, background.of, cells, gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
@@ -107,8 +138,14 @@ Gain without_noise(const Gain& gain) {
 
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch) {
+  // without_noise() takes so little for none.
   return without_noise(
-      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
+      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch, kBin));
+}
+
+bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
+  return brightness(gain) > kSwings &&
+         share_at_end(CellPlanes(frames, frame).of, frames.cells()) > kEnds;
 }
 
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
@@ -127,6 +164,17 @@ Gain light_between(const GridFrames& frames, int frame, const GridFrames& backgr
 }
 
 namespace {
+
+// The numbers of the darkest frames, in time order.
+std::vector<size_t> darkest(const std::vector<Gain>& gains) {
+  std::vector<size_t> found(gains.size());
+  std::iota(found.begin(), found.end(), size_t{0});
+  std::stable_sort(found.begin(), found.end(),
+                   [&](size_t a, size_t b) { return brightness(gains[a]) < brightness(gains[b]); });
+  found.resize(most_darkest(found.size()));
+  std::sort(found.begin(), found.end());
+  return found;
+}
 
 bool changes(const Gain& gain) { return std::abs(std::log(brightness(gain))) > kStill; }
 
@@ -192,7 +240,13 @@ class FramesOfLight {
   // Each cell's median over the frames (kMedianRows of them at most) in unit light.
   const GridFrames& median(const std::vector<Gain>& gains) {
     if (median_gains_ == gains) return median_;
-    const size_t used = std::min<size_t>(count_, kMedianRows);
+    std::vector<size_t> all(count_);
+    std::iota(all.begin(), all.end(), size_t{0});
+    return median(gains, all);
+  }
+  // The same of these frames.
+  const GridFrames& median(const std::vector<Gain>& gains, const std::vector<size_t>& of) {
+    const size_t used = std::min<size_t>(of.size(), kMedianRows);
     constexpr size_t kTogether = 512;
     const size_t parts = (cells() + kTogether - 1) / kTogether;
     for_each(kChannels * parts, [&](size_t part, size_t) {
@@ -200,7 +254,7 @@ class FramesOfLight {
       const float* rows[kMedianRows];
       float divisors[kMedianRows];
       for (size_t i = 0; i < used; ++i) {
-        const size_t t = i * count_ / used;
+        const size_t t = of[i * of.size() / used];
         rows[i] = planes(t).of[c] + first;
         divisors[i] = gains[t][c];
       }
@@ -210,9 +264,22 @@ class FramesOfLight {
     median_gains_ = gains;
     return median_;
   }
-  GridFrames take_median(const std::vector<Gain>& gains) {
-    median(gains);
+  // darker: of the darkest frames.
+  GridFrames take_median(const std::vector<Gain>& gains, bool darker) {
+    if (darker)
+      median(gains, darkest(gains));
+    else
+      median(gains);
     return std::move(median_);
+  }
+
+  // True where samples are at the end of their range while light changes.
+  bool clips(const std::vector<Gain>& gains) {
+    const auto [least, most] = std::minmax_element(
+        gains.begin(), gains.end(),
+        [](const Gain& a, const Gain& b) { return brightness(a) < brightness(b); });
+    if (brightness(*most) < kSwings * brightness(*least)) return false;
+    return share_at_end(planes(static_cast<size_t>(most - gains.begin())).of, cells()) > kEnds;
   }
 
  private:
@@ -235,14 +302,27 @@ class FramesOfLight {
   std::vector<Gain> median_gains_;  // with which it was made
 };
 
+// Makes gains those over the light of the darker frames.
+void darken(std::vector<Gain>* gains) {
+  std::vector<Gain> sorted = *gains;
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Gain& a, const Gain& b) { return brightness(a) < brightness(b); });
+  const float usual = brightness(sorted[sorted.size() / 2]);
+  auto at = static_cast<size_t>(kDarker * static_cast<float>(sorted.size()));
+  while (at < sorted.size() / 2 && brightness(sorted[at]) < kDarkest * usual) ++at;
+  const Gain unit = sorted[at];
+  for (Gain& gain : *gains)
+    for (size_t c = 0; c < kChannels; ++c) gain[c] /= unit[c];
+}
+
 }  // namespace
 
-std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool, GridFrames* median) {
+WindowLight light_of(const GridPictures& frames, int count, Pool* pool, GridFrames* median) {
   FramesOfLight all(frames, count, pool);
   if (count < 2) {
     std::vector<Gain> same(static_cast<size_t>(count), kSameLight);
-    if (median) *median = all.take_median(same);
-    return same;
+    if (median) *median = all.take_median(same, false);
+    return {same, false};
   }
   std::vector<Gain> gains = all.over_median();
   const float agree = all.mean_agreement(gains);
@@ -255,9 +335,14 @@ std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool, Gr
       if (better > std::max(kLeastFollowed, agree + kFollowed)) gains = std::move(followed);
     }
   }
-  if (std::any_of(gains.begin(), gains.end(), is_lit)) settle_light(&gains);
-  if (median) *median = all.take_median(gains);
-  return gains;
+  const bool lit = std::any_of(gains.begin(), gains.end(), is_lit);
+  const bool clips = lit && all.clips(gains);
+  if (clips)
+    darken(&gains);
+  else if (lit)
+    settle_light(&gains);
+  if (median) *median = all.take_median(gains, clips);
+  return {gains, clips};
 }
 
 uint64_t light_of_bytes(const Grid& grid, int threads) {

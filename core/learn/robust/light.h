@@ -1,22 +1,34 @@
 // Global changes of light: how much brighter a frame is than another picture of the same scene.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include "core/learn/robust/learning_steps.h"
 #include "core/parallel/pool.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
+
+// The light of a window's frames.
+struct WindowLight {
+  std::vector<Gain> gains;
+  // Samples are at the end of their range in some of the frames, and the light changes: unit light
+  // is that of the darker frames, in which fewer are.
+  bool clips = false;
+};
 
 // The gains of frames 0 .. count - 1 over their common background: 1 where a change of light does
 // not explain what the frame and the background differ in, so that what moves counts as no light.
 // Small changes around the light of most frames are left out: they are noise. median: becomes each
 // cell's median over the frames (64 of them at most) in unit light, as frame 0; or null. pool: null
 // for one thread.
-std::vector<Gain> light_of(const GridPictures& frames, int count, Pool* pool = nullptr,
-                           GridFrames* median = nullptr);
+WindowLight light_of(const GridPictures& frames, int count, Pool* pool = nullptr,
+                     GridFrames* median = nullptr);
 // The bytes that it takes.
 uint64_t light_of_bytes(const Grid& grid, int threads);
 
@@ -25,11 +37,11 @@ class LightScratch {
  public:
   LightScratch() = default;
   explicit LightScratch(size_t cells) {
-    ratios.reserve(cells);
-    near.reserve(cells);
+    ratios.reserve(kChannels * cells);
+    near.reserve(kChannels * cells);
   }
   static uint64_t bytes(uint64_t cells) {
-    return cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
+    return kChannels * cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
   }
 
   std::vector<std::pair<float, size_t>> ratios;
@@ -46,6 +58,49 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
 // little, one of them.
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after);
+
+// True where a frame is brighter than unit light, and samples are at the end of their range.
+bool at_end(const GridFrames& frames, int frame, const Gain& gain);
+
+// How many of so many frames are the darkest ones, which say what is behind samples at the end of
+// their range.
+inline size_t most_darkest(size_t frames) {
+  return std::min(frames, std::max(steps::light::kLeastDark, frames / steps::light::kDarkOf));
+}
+
+// True where a channel that shows `level` says no more than that it is brighter (darker) than that,
+// and than `expected`, what `background` would show in a frame with this gain.
+inline bool is_bound(float level, float expected, float background, float gain) {
+  using namespace steps::light;
+  return (level >= kNearEnd && expected > level) ||
+         (background >= kAtEnd && gain < 1 && level > expected);
+}
+
+// True where a cell that shows `level` in a frame with this gain may show `background`, which is in
+// unit light: samples at the end of their range are bounds.
+inline bool may_show(const std::array<float, kChannels>& level,
+                     const std::array<float, kChannels>& background, const Gain& gain) {
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float expected = background[c] * gain[c];
+    if (is_bound(level[c], expected, background[c], gain[c])) continue;
+    if (std::abs(level[c] - expected) > steps::light::kOther * std::max(1.0f, gain[c]))
+      return false;
+  }
+  return true;
+}
+
+// `level`; where it may show `background`, and samples hide that, the background in that light.
+inline std::array<float, kChannels> unclipped(const std::array<float, kChannels>& level,
+                                              const std::array<float, kChannels>& background,
+                                              const Gain& gain) {
+  if (!may_show(level, background, gain)) return level;
+  std::array<float, kChannels> found = level;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float expected = background[c] * gain[c];
+    if (is_bound(level[c], expected, background[c], gain[c])) found[c] = expected;
+  }
+  return found;
+}
 
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.

@@ -16,10 +16,7 @@ void FrameFollower::mend(const Learner::Compared& frame, BackgroundModel* model)
   if (frame.live) {
     look_ahead(frame, model);
   } else {
-    const int slot = frame.around.slot(frame.at);
-    const GridFrames& cells = context_.room.frames->cells();
-    const Cells now(cells, slot);
-    looks_.follow(now, light, frame.number);
+    looks_.follow(unclipped_cells(frame.around.slot(frame.at), light), light, frame.number);
     // What was absorbed is background until it goes.
     if (absorbed_.any()) {
       std::vector<int> uncovered = looks_.uncovered(background);
@@ -38,10 +35,10 @@ void FrameFollower::mend(const Learner::Compared& frame, BackgroundModel* model)
 void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* model) {
   if (!context_.follows(context_.room.models)) return;
   const int slot = frame.around.slot(frame.at);
-  const GridFrames& cells = context_.room.frames->cells();
-  const Cells now(cells, slot);
   const Gain light = !model ? kSameLight : frame.live ? model->light(frame.t) : this->light(slot);
-  memory_.follow(now, light, frame.number);
+  exposure_.follow(Cells(context_.room.frames->cells(), slot), context_.grid.cells());
+  if (!exposure_.settled()) memory_.forget();
+  memory_.follow(unclipped_cells(slot, light), light, frame.number);
   if (!model) return;
   const Cells background = this->background();
   model->set_time(frame.t);

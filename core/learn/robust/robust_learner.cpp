@@ -113,7 +113,14 @@ void RobustLearner::publish() {
 
 void RobustLearner::begin_scene(bool returns) {
   memory_.begin_scene(returns);
+  if (const ColourMap* map = follower_.new_colours(); map && !returns) memory_.recolour(*map);
   follower_.begin_scene();
+}
+
+bool RobustLearner::recolour(Learnt* learnt) const {
+  const ColourMap* const map = follower_.new_colours();
+  if (map) qdmd::recolour(*map, learnt);
+  return map != nullptr;
 }
 
 void RobustLearner::remember(Learnt* learnt) const {
@@ -138,6 +145,8 @@ void RobustLearner::set_sample_step(int step) {
 
 void RobustLearner::decompose(const SnapshotRange& snapshots) {
   window_ = snapshots;
+  if (follower_.has_found_exposure()) memory_.begin_from_here();
+  settled_ = follower_.settled();
   memory_.see(snapshots);
   follower_.tell(&history_);
 }
@@ -161,6 +170,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
     memory_.take(solve_, *cells, next, history_.held());
     solve_.write_limits(model->make_limits());
   }
+  facts_.settled = settled_;
   facts_.window_frames = window_->size();
   facts_.sample_step = context_.step;
   facts_.iterations = context_.options.iterations;

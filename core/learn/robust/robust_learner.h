@@ -61,6 +61,7 @@ class RobustLearner : public Learner {
 
   SceneSeen scene_of(int slot) override { return follower_.scene_of(slot); }
   void begin_scene(bool returns) override;
+  bool recolour(Learnt* learnt) const override;
 
   bool follows_light() const override { return true; }
   void follow(const std::vector<uint8_t> level[kChannels]) override { follower_.follow(level); }
@@ -74,6 +75,7 @@ class RobustLearner : public Learner {
   FrameFollower follower_;
   // Of the newest solve.
   std::optional<SnapshotRange> window_;
+  bool settled_ = false;
   SolveFacts facts_;
 };
 

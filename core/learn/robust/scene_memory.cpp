@@ -36,11 +36,12 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
       young_frames_(young_frames) {
   found_.reserve(grid.cells());
   around_.reserve(grid.cells());
+  differing_.reserve(grid.cells());
 }
 
 uint64_t SceneMemory::bytes(const Grid& grid) {
   return StandingLooks::bytes(grid) + HistoryStarts::bytes(grid.cells()) +
-         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 2 * sizeof(int));
+         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 3 * sizeof(int));
 }
 
 void SceneMemory::forget() {
@@ -232,46 +233,47 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
     news_ = looks_.any_news();
     return left;
   }
-  const size_t differing = looks_.find_differing(background, &differs_);
+  looks_.find_differing(background, &differs_, &differing_);
   const bool any_left =
       newest_left_ != StandingLooks::kNever && looks_.newest() - newest_left_ <= kPieces;
-  if (differing < kLeastRegion && (differing == 0 || !any_left)) return found_;
-  size_t news = 0;
-  for (size_t cell = 0; cell < grid_.cells(); ++cell)
-    news += differs_[cell] &&
-            looks_.newest() - looks_.since(static_cast<int>(cell)) < StandingLooks::kNewsFrames;
+  if (differing_.size() < kLeastRegion && (differing_.empty() || !any_left)) return found_;
+  const auto news =
+      static_cast<size_t>(std::count_if(differing_.begin(), differing_.end(), [&](int at) {
+        return looks_.newest() - looks_.since(at) < StandingLooks::kNewsFrames;
+      }));
   news_ = news >= StandingLooks::kLeastNews;
-  if (judge_as_one(differing)) return found_;
+  if (judge_as_one()) return found_;
   // What was judged stays so as long as it is there.
-  for (size_t cell = 0; cell < grid_.cells(); ++cell) {
-    unjudged_[cell] = 0;
-    if (!differs_[cell]) continue;
-    const int at = static_cast<int>(cell);
+  std::fill(unjudged_.begin(), unjudged_.end(), uint8_t{0});
+  for (int at : differing_) {
+    const auto cell = static_cast<size_t>(at);
     if (since_[cell] < looks_.since(at)) of_[cell] = Of::none;
     unjudged_[cell] = of_[cell] == Of::none;
   }
-  CellRegions regions(grid_);
-  for (const std::vector<int>& region : regions.find(unjudged_)) {
-    judge(region, contours);
-    if (of_[static_cast<size_t>(region[0])] == Of::left)
-      found_.insert(found_.end(), region.begin(), region.end());
+  if (looks_.newest() % kEvery == 0) {
+    CellRegions regions(grid_);
+    for (const std::vector<int>& region : regions.find(unjudged_)) {
+      judge(region, contours);
+      if (of_[static_cast<size_t>(region[0])] == Of::left)
+        found_.insert(found_.end(), region.begin(), region.end());
+    }
+    if (!found_.empty()) widen(background);
   }
-  if (!found_.empty()) widen(background);
   // What passes before a cell may have hidden what is behind.
-  for (size_t cell = 0; cell < grid_.cells(); ++cell)
-    if (differs_[cell] && !unjudged_[cell] && of_[cell] == Of::left)
-      found_.push_back(static_cast<int>(cell));
+  for (int at : differing_)
+    if (!unjudged_[static_cast<size_t>(at)] && of_[static_cast<size_t>(at)] == Of::left)
+      found_.push_back(at);
   return found_;
 }
 
 // No object changes so much of the picture: the camera was moved, or something disturbs it. What
 // lasts is background.
-bool SceneMemory::judge_as_one(size_t differing) {
-  if (kMostOfPicture * static_cast<double>(grid_.cells()) > static_cast<double>(differing))
+bool SceneMemory::judge_as_one() {
+  if (kMostOfPicture * static_cast<double>(grid_.cells()) > static_cast<double>(differing_.size()))
     return false;
-  for (size_t cell = 0; cell < differs_.size(); ++cell) {
-    const int at = static_cast<int>(cell);
-    if (!differs_[cell] || looks_.newest() - looks_.since(at) < kLasts) continue;
+  for (int at : differing_) {
+    const auto cell = static_cast<size_t>(at);
+    if (looks_.newest() - looks_.since(at) < kLasts) continue;
     if (of_[cell] != Of::left || since_[cell] < looks_.since(at)) {
       of_[cell] = Of::left;
       since_[cell] = looks_.since(at);

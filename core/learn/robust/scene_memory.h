@@ -108,7 +108,7 @@ class SceneMemory {
   bool is_all_over(int64_t since) const;
   bool left_beside(const std::vector<int>& region) const;
   void widen(const float* const background[3]);
-  bool judge_as_one(size_t differing);
+  bool judge_as_one();
   float apart(int cell, const float* const background[3]) const;
   template <typename What>
   void each_near(int cell, int reach, const What& what) const;
@@ -122,7 +122,7 @@ class SceneMemory {
   std::vector<int64_t> since_, left_;
   int64_t newest_left_ = StandingLooks::kNever;
   std::vector<uint8_t> differs_, unjudged_, marks_;
-  std::vector<int> found_, around_;
+  std::vector<int> found_, around_, differing_;
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;
 };

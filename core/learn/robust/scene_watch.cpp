@@ -130,12 +130,14 @@ bool SceneWatch::is_back(const float* const frame[3]) {
 }
 
 SceneSeen SceneWatch::follow(const float* const frame[3], const float* const background[3]) {
+  shows_background_ = false;
   if (std::min(rows_, cols_) < 2 * kTilesAlong) return SceneSeen::same;
   find_edges(background, &background_);
   std::vector<float>& newest = frames_[next_];
   next_ = (next_ + 1) % kFrames;
   find_edges(frame, &newest);
   const Look look = look_of(newest, background_);
+  shows_background_ = look == Look::same;
   strange_ = look == Look::strange ? strange_ + 1 : 0;
   const bool returned = look != Look::same && left_known_ && look_of(newest, left_) == Look::same;
   returned_ = returned ? returned_ + 1 : 0;

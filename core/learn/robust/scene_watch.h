@@ -25,6 +25,8 @@ class SceneWatch {
 
   // Nothing is known.
   void forget() { strange_ = returned_ = 0, left_known_ = false; }
+  // The newest frame of follow() shows the contours of the background.
+  bool shows_background() const { return shows_background_; }
   // The frames to come are compared with another background, of another scene.
   void leave();
   // True with the second frame in a row that shows the scene that was left.
@@ -50,7 +52,7 @@ class SceneWatch {
   // Edges of each channel and block, to the right and down; 0 at the borders.
   std::vector<float> background_, left_, frames_[kFrames];  // the newest ones, a ring
   int next_ = 0, strange_ = 0, returned_ = 0;               // the last two: frames in a row
-  bool left_known_ = false;
+  bool left_known_ = false, shows_background_ = false;
 };
 
 }  // namespace qdmd

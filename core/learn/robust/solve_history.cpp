@@ -4,6 +4,18 @@
 #include <limits>
 
 namespace qdmd {
+namespace {
+
+// Sets bits first .. end - 1.
+void set_bits(size_t first, size_t end, uint8_t* bits) {
+  while (first < end) {
+    const size_t at = first % 8, count = std::min(8 - at, end - first);
+    bits[first / 8] |= static_cast<uint8_t>(((1u << count) - 1) << at);
+    first += count;
+  }
+}
+
+}  // namespace
 
 void SolveHistory::begin() {
   const size_t cells = context_.grid.cells();
@@ -57,10 +69,8 @@ void SolveHistory::take_out(int64_t number, uint8_t* bits) const {
          y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
          ++y) {
       const size_t line = static_cast<size_t>(y) * static_cast<size_t>(context_.grid.width);
-      for (int x = context_.grid.left(col); x < context_.grid.left(col + 1); ++x) {
-        const size_t p = line + static_cast<size_t>(x);
-        bits[p / 8] |= static_cast<uint8_t>(1u << (p % 8));
-      }
+      set_bits(line + static_cast<size_t>(context_.grid.left(col)),
+               line + static_cast<size_t>(context_.grid.left(col + 1)), bits);
     }
   }
 }

@@ -226,12 +226,12 @@ void StandingLooks::leave_out_hidden(const GridFrames& frames, std::span<const L
   });
 }
 
-size_t StandingLooks::find_differing(const float* const background[3],
-                                     std::vector<uint8_t>* differs) const {
+void StandingLooks::find_differing(const float* const background[3], std::vector<uint8_t>* differs,
+                                   std::vector<int>* differing) const {
+  differing->clear();
   const float* const look[3] = {looks_.plane(kLook, 0), looks_.plane(kLook, 1),
                                 looks_.plane(kLook, 2)};
   const float kDiffer = kChannels * kLooksDiffer;
-  size_t found = 0;
   in_blocks(grid_.cells(), [&](size_t first, size_t count) {
     float apart[kTogether];
     uint8_t* const out = differs->data() + first;
@@ -239,10 +239,9 @@ size_t StandingLooks::find_differing(const float* const background[3],
     if (compare({look, first}, {background, first}, count, apart, kDiffer) == 0) return;
     for (size_t i = 0; i < count; ++i) {
       out[i] = apart[i] > kDiffer && shows(first + i);
-      found += out[i];
+      if (out[i]) differing->push_back(static_cast<int>(first + i));
     }
   });
-  return found;
 }
 
 const std::vector<int>& StandingLooks::stood(const float* const background[3], int64_t frames) {

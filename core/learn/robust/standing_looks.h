@@ -59,9 +59,10 @@ class StandingLooks {
   // True where the cell shows its look now.
   bool shows_look(int cell) const { return shows(static_cast<size_t>(cell)); }
   const GridFrames& levels() const { return looks_; }
-  // Marks the cells that show their look now, where it is another than the background's. Returns
-  // how many they are.
-  size_t find_differing(const float* const background[3], std::vector<uint8_t>* differs) const;
+  // Marks the cells that show their look now, where it is another than the background's, and makes
+  // a list of them.
+  void find_differing(const float* const background[3], std::vector<uint8_t>* differs,
+                      std::vector<int>* differing) const;
   int64_t newest() const { return number_; }
   // True where something passed before the cell's look in that frame, one of the last kHistory.
   static constexpr int kHistory = 256;

@@ -36,6 +36,18 @@ void StreamMemory::begin_scene(bool returns) {
   stream_from_ = -1;
 }
 
+void StreamMemory::recolour(const ColourMap& map) {
+  if (!left_.known()) return;
+  earlier_ = left_;
+  earlier_.recolour(context_.grid, map);
+}
+
+void StreamMemory::begin_from_here() {
+  earlier_.forget();
+  frames_.forget();
+  stream_from_ = static_cast<int64_t>(context_.room.frames->frames_taken());
+}
+
 void StreamMemory::see(const SnapshotRange& window) {
   window_ = window;
   const uint64_t seen = context_.room.frames->frames_taken();
@@ -59,7 +71,8 @@ void StreamMemory::keep_some() {
       steps::memory::kStep * remembered_stride(context_.room.models, context_.room.window_size);
   for (int i = 0; i < window_->size(); ++i) {
     const int64_t number = first_number() + i;
-    if ((number - stream_from_) % step != 0 || number <= frames_.newest()) continue;
+    if (number < stream_from_ || (number - stream_from_) % step != 0) continue;
+    if (number <= frames_.newest()) continue;
     frames_.keep(number, *window_, i, context_.room.frames->cells(),
                  int64_t{steps::memory::kWindows} * context_.room.window_size, context_.room.pool);
   }

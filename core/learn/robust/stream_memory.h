@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/earlier_window.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/window_solve.h"
@@ -20,6 +21,10 @@ class StreamMemory {
   // What was known of the scene is kept for its return. returns: the scene that was left last is
   // back, and what was known of it is known again.
   void begin_scene(bool returns);
+  // Nothing that frames have shown until now is remembered.
+  void begin_from_here();
+  // The scene that was left goes on in other colours.
+  void recolour(const ColourMap& map);
   // The window of the next solve: the newest frames.
   void see(const SnapshotRange& window);
   // The number of its first frame, counted like FrameStore::frames_taken().

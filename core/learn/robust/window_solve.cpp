@@ -125,7 +125,22 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
     find_mask(reference_, snapshots.picture(t), gains_[static_cast<size_t>(t)], bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
+    if (clips_) fill_ends(t, bits);
   });
+}
+
+// Takes out what the background would show at the end of the samples' range: such a sample says
+// only that it is at least so bright.
+void WindowSolve::fill_ends(int snapshot, uint8_t* bits) const {
+  const Gain& gain = gains_[static_cast<size_t>(snapshot)];
+  if (!is_lit(gain)) return;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const uint8_t* const level = reference_.level[c].data();
+    const auto least = static_cast<int>(std::ceil(250 / gain[c]));
+    if (gain[c] <= 1 || least > 255) continue;
+    for (size_t p = 0; p < context_.pixels(); ++p)
+      bits[p / 8] = static_cast<uint8_t>(bits[p / 8] | (level[p] >= least) << (p % 8));
+  }
 }
 
 Decomposition WindowSolve::decompose_filled() {
@@ -187,7 +202,7 @@ void WindowSolve::refine_light() {
   std::vector<int> all(gains_.size());
   std::iota(all.begin(), all.end(), 0);
   refine_gains(window_->snapshots, all, &gains_);
-  settle_light(&gains_);
+  if (!clips_) settle_light(&gains_);
 }
 
 // refine_gain() of some frames, by the samples of all members.

@@ -73,9 +73,14 @@ class WindowSolve {
     std::vector<const float*> cells;
     std::vector<int64_t> numbers;  // of the frames
     Recollection recollection;
+    GridFrames median;  // of the window's frames, in unit light; where anybody asks for it
   };
   Looks gather(const Known& known);
   void start(const Known& known);
+  void take_unit_of(const GridFrames& earlier, GridFrames* here);
+  void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
+  void prefer_darker(const Looks& looks, const GridPictures& chosen);
+  void fill_ends(int snapshot, uint8_t* bits) const;
   void take_background(const Looks& looks, const EarlierWindow& earlier);
   void recall_spread(const EarlierWindow& earlier, std::vector<uint8_t>* spread) const;
   void refine_light();
@@ -103,6 +108,7 @@ class WindowSolve {
   ReferencePicture reference_;
   std::vector<uint8_t> spread_, reach_;
   std::vector<Gain> gains_;  // of the snapshots
+  bool clips_ = false;       // WindowLight::clips
   WindowMask mask_;          // of the snapshots
   Window samples_;           // filled
   SlidingGram gram_;

@@ -33,9 +33,11 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   for (int t = 0; t < m; ++t) frames.add(of_frames.plane(snapshots.slot(t), 0));
   Looks looks;
   const int old = looks.old = memory.older_than(window_->first);
-  GridFrames here;
-  const bool recalls = old > 0 || known.earlier->known();
-  gains_ = light_of(frames, m, context_.room.pool, recalls ? &here : nullptr);
+  GridFrames& here = looks.median;
+  WindowLight light = light_of(frames, m, context_.room.pool, &here);
+  gains_ = std::move(light.gains);
+  clips_ = light.clips;
+  if (clips_ && known.earlier->known()) take_unit_of(known.earlier->cells(), &here);
 
   const int of_window = std::min(m, context_.parameters.start_frames);
   looks.count = of_window + old;
@@ -50,6 +52,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
                            memory.shape()};
     });
     for (int k = 0; k < old; ++k) {
+      clips_ |= at_end(memory.cells(), memory.slot(k), looks.pictures[static_cast<size_t>(k)].gain);
       looks.cells.push_back(memory.cells().plane(memory.slot(k), 0));
       looks.numbers.push_back(memory.number(k));
     }
@@ -75,6 +78,28 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   return looks;
 }
 
+// Where samples are at the end of their range, a darker picture of earlier windows knows more: unit
+// light becomes its light, and `here` is what it shows where these frames say only "at least".
+void WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
+  const size_t cells = context_.grid.cells();
+  LightScratch scratch(cells);
+  const Gain gain = light_over(earlier, 0, *here, 0, &scratch);
+  const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
+    for (Gain& of_frame : gains_) of_frame[c] /= unit;
+    float darkest = gains_[0][c];
+    for (const Gain& of_frame : gains_) darkest = std::min(darkest, of_frame[c]);
+    float* const levels = here->plane(0, static_cast<int>(c));
+    const float* const known = earlier.plane(0, static_cast<int>(c));
+    for (size_t cell = 0; cell < cells; ++cell) {
+      levels[cell] *= unit;
+      const bool at_end = levels[cell] * darkest >= steps::light::kNearEnd;
+      if (at_end) levels[cell] = std::max(levels[cell], known[cell] * unit / gain[c]);
+    }
+  }
+}
+
 // The background picture of the stable frames, its thresholds, and the light of each frame.
 void WindowSolve::start(const Known& known) {
   const Looks looks = gather(known);
@@ -98,6 +123,7 @@ void WindowSolve::start(const Known& known) {
       std::transform(channel, channel + cells, to + c * cells,
                      [inverse](float level) { return level * inverse; });
     }
+    if (clips_) unclip(looks.cells[i], looks.median, gain, to);
     chosen.add(to);
   }
   const bool recalls = known.earlier->known();
@@ -112,7 +138,83 @@ void WindowSolve::start(const Known& known) {
     return;
   }
   start_frames_ = looks.count;
+  if (clips_) prefer_darker(looks, chosen);
   take_background(looks, *known.earlier);
+}
+
+// Writes a frame's cells in unit light, as far as `median` says what clipped samples hide.
+void WindowSolve::unclip(const float* shown, const GridFrames& median, const Gain& gain,
+                         float* out) const {
+  const size_t cells = context_.grid.cells();
+  for (size_t cell = 0; cell < cells; ++cell) {
+    const auto found = unclipped(
+        {shown[cell], shown[cells + cell], shown[2 * cells + cell]},
+        {median.plane(0, 0)[cell], median.plane(0, 1)[cell], median.plane(0, 2)[cell]}, gain);
+    for (size_t c = 0; c < kChannels; ++c) out[c * cells + cell] = found[c] / gain[c];
+  }
+}
+
+// Frames in which a cell's samples may be at the end of their range say nothing of its background.
+// Where all that show it are such, darker ones that may show the same say it; else the darkest do.
+// chosen: the looks in unit light.
+void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) {
+  using steps::light::kNearEnd;
+  const size_t cells = context_.grid.cells();
+  std::vector<std::pair<float, uint16_t>> shown, darker;
+  std::vector<uint8_t> keeps(looks.pictures.size());
+  const auto level = [&](size_t frame, size_t cell) -> std::array<float, kChannels> {
+    const float* const of = looks.cells[frame];
+    return {of[cell], of[cells + cell], of[2 * cells + cell]};
+  };
+  // What most dark frames show.
+  const auto shows_median = [&](size_t frame, size_t cell) {
+    float apart = 0;
+    for (int c = 0; c < kChannels; ++c)
+      apart +=
+          std::abs(chosen.plane(static_cast<int>(frame), c)[cell] - looks.median.plane(0, c)[cell]);
+    return apart < kChannels * steps::light::kNearMedian;
+  };
+  // With what is cut off.
+  const auto brightest = [&](size_t frame, size_t cell) {
+    const auto of = level(frame, cell);
+    float most = std::max({of[0], of[1], of[2]});
+    if (!shows_median(frame, cell)) return most;
+    for (int c = 0; c < kChannels; ++c)
+      most = std::max(most, looks.median.plane(0, c)[cell] *
+                                looks.pictures[frame].gain[static_cast<size_t>(c)]);
+    return most;
+  };
+  // What frame `dark` shows could be what frame `bright` does, too.
+  const auto explains = [&](size_t dark, size_t bright, size_t cell) {
+    const int at = static_cast<int>(dark);
+    return shows_median(dark, cell) &&
+           may_show(
+               level(bright, cell),
+               {chosen.plane(at, 0)[cell], chosen.plane(at, 1)[cell], chosen.plane(at, 2)[cell]},
+               looks.pictures[bright].gain);
+  };
+  for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
+    shown.clear();
+    for (const uint16_t frame : stable_.of_cell[cell])
+      shown.emplace_back(brightest(frame, cell), frame);
+    std::sort(shown.begin(), shown.end());
+    std::fill(keeps.begin(), keeps.end(), uint8_t{0});
+    if (shown.empty() || shown.back().first < kNearEnd) continue;
+    if (shown.front().first >= kNearEnd) {
+      darker.clear();
+      for (size_t frame = 0; frame < keeps.size(); ++frame)
+        if (brightest(frame, cell) < shown.front().first &&
+            explains(frame, shown.front().second, cell))
+          darker.emplace_back(brightest(frame, cell), static_cast<uint16_t>(frame));
+      std::sort(darker.begin(), darker.end());
+      if (!darker.empty()) shown.swap(darker);
+    }
+    const bool any = shown.front().first < kNearEnd;
+    const size_t darkest = most_darkest(shown.size());
+    for (size_t i = 0; i < shown.size(); ++i)
+      keeps[shown[i].second] = any ? shown[i].first < kNearEnd : i < darkest;
+    stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
+  }
 }
 
 void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earlier) {

@@ -1,0 +1,99 @@
+#include "core/learn/robust/colour_map.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/learn/robust/learning_steps.h"
+
+namespace qdmd {
+namespace {
+
+using namespace steps::colour;
+
+uint8_t rounded(float level) {
+  return static_cast<uint8_t>(std::clamp(level + 0.5f, 0.0f, 255.0f));
+}
+
+}  // namespace
+
+std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
+                                         const float* const background[kChannels], size_t cells) {
+  std::vector<float> away(cells, 0);
+  ColourMap map = {};
+  float limit = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    // A ridge, so that a background of one colour has a map, too.
+    Eigen::Matrix4d square = Eigen::Matrix4d::Identity();
+    Eigen::Matrix<double, 4, kChannels> product = Eigen::Matrix<double, 4, kChannels>::Zero();
+    for (size_t cell = 0; cell < cells; ++cell) {
+      if (away[cell] > limit) continue;
+      const Eigen::Vector4d from(static_cast<double>(background[0][cell]),
+                                 static_cast<double>(background[1][cell]),
+                                 static_cast<double>(background[2][cell]), 1);
+      const Eigen::RowVector3d to(static_cast<double>(frame[0][cell]),
+                                  static_cast<double>(frame[1][cell]),
+                                  static_cast<double>(frame[2][cell]));
+      square.noalias() += from * from.transpose();
+      product.noalias() += from * to;
+    }
+    const Eigen::Matrix<double, 4, kChannels> found = square.ldlt().solve(product);
+    if (!found.allFinite()) return std::nullopt;
+    for (int c = 0; c < kChannels; ++c)
+      for (int k = 0; k <= kChannels; ++k)
+        map.row[static_cast<size_t>(c)][static_cast<size_t>(k)] = static_cast<float>(found(k, c));
+    for (size_t cell = 0; cell < cells; ++cell) {
+      const auto expected = map.of({background[0][cell], background[1][cell], background[2][cell]});
+      away[cell] = 0;
+      for (size_t c = 0; c < kChannels; ++c) away[cell] += std::abs(frame[c][cell] - expected[c]);
+    }
+    std::vector<float> sorted = away;
+    const auto at = sorted.begin() + static_cast<ptrdiff_t>(kFits * static_cast<double>(cells));
+    std::nth_element(sorted.begin(), at, sorted.end());
+    limit = *at;
+  }
+  return limit < kChannels * kExplained ? std::optional(map) : std::nullopt;
+}
+
+Colouring colouring_of(const float* const cells[kChannels], size_t count, Colours colours) {
+  if (colours == Colours::grey) return Colouring::little;
+  constexpr float kNeutral = 128;
+  double colour = 0, level = 0;
+  for (size_t cell = 0; cell < count; ++cell) {
+    const float a = cells[0][cell], b = cells[1][cell], c = cells[2][cell];
+    const float spread = colours == Colours::yuv
+                             ? std::max(std::abs(b - kNeutral), std::abs(c - kNeutral))
+                             : std::max({a, b, c}) - std::min({a, b, c});
+    colour += static_cast<double>(spread);
+    level += static_cast<double>(colours == Colours::yuv ? a : (a + b + c) / 3);
+  }
+  if (colour < kNone * level) return Colouring::none;
+  return colour > kSome * level ? Colouring::some : Colouring::little;
+}
+
+void recolour(const ColourMap& map, size_t count, uint8_t* const level[kChannels]) {
+  for (size_t p = 0; p < count; ++p) {
+    const auto now = map.of({static_cast<float>(level[0][p]), static_cast<float>(level[1][p]),
+                             static_cast<float>(level[2][p])});
+    for (size_t c = 0; c < kChannels; ++c) level[c][p] = rounded(now[c]);
+  }
+}
+
+void recolour(const ColourMap& map, Learnt* learnt) {
+  OwnedPicture& picture = learnt->picture;
+  uint8_t* const level[kChannels] = {picture.level[0].data(), picture.level[1].data(),
+                                     picture.level[2].data()};
+  recolour(map, picture.level[0].size(), level);
+  // The bits below are those of other levels: the middle of what they can be.
+  for (auto& below : picture.below)
+    for (uint8_t& bits : below) bits = static_cast<uint8_t>(1 << (picture.depth - 9));
+  if (!learnt->earlier) return;
+  LearntEarlier& earlier = *learnt->earlier;
+  uint8_t* const known[kChannels] = {earlier.level[0].data(), earlier.level[1].data(),
+                                     earlier.level[2].data()};
+  recolour(map, earlier.level[0].size(), known);
+  earlier.places.clear();
+}
+
+}  // namespace qdmd

@@ -1,0 +1,40 @@
+// A scene in other colours: what a camera shows of it once it has switched to infra-red.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "core/base/channels.h"
+#include "core/base/colours.h"
+#include "core/model/learnt.h"
+
+namespace qdmd {
+
+// out[c] = row[c][0 .. 2] . in + row[c][3], in levels.
+struct ColourMap {
+  std::array<std::array<float, kChannels + 1>, kChannels> row;
+
+  std::array<float, kChannels> of(const std::array<float, kChannels>& in) const {
+    std::array<float, kChannels> out;
+    for (size_t c = 0; c < kChannels; ++c)
+      out[c] = row[c][0] * in[0] + row[c][1] * in[1] + row[c][2] * in[2] + row[c][3];
+    return out;
+  }
+};
+
+// Least squares over the cells of a frame and of a background, without those that fit worst: what
+// is in front. Nothing where no map explains most of them.
+std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
+                                         const float* const background[kChannels], size_t cells);
+
+// How coloured a picture is: none where hardly any cell has a colour, some where many have.
+enum class Colouring { none, little, some };
+Colouring colouring_of(const float* const cells[kChannels], size_t count, Colours colours);
+
+// `count` pixels of a picture, and what a window knows.
+void recolour(const ColourMap& map, size_t count, uint8_t* const level[kChannels]);
+void recolour(const ColourMap& map, Learnt* learnt);
+
+}  // namespace qdmd
