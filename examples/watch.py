@@ -43,28 +43,38 @@ def make_pipeline(options):
     return pipeline, separator
 
 
+# Of things that are followed: the lowest that may still be there, and the highest so far.
+NUMBERS = [0, 0]
+
+
 def regions_of(buffer):
-    # Python finds a region by its number alone, and all may have the same: on a copy, what has been
-    # read gets another one.
+    # Python finds a region by its number alone, and others than ours may have the same: on a copy,
+    # what has been read gets another one. A thing keeps its number, and new ones have higher ones.
     copy = buffer.copy()
-    kind = GstVideo.video_region_of_interest_meta_api_get_type()
-    for number in range(copy.get_n_meta(kind)):
+    left = copy.get_n_meta(GstVideo.video_region_of_interest_meta_api_get_type())
+    number, found = NUMBERS[0], []
+    while left > 0 and number < NUMBERS[1] + 1000:
         while region := GstVideo.buffer_get_video_region_of_interest_meta_id(copy, number):
+            left -= 1
             if GLib.quark_to_string(region.roi_type) == 'foreground':
-                yield region
+                found.append(number)
+                yield number, region
             region.id = -1
+        number += 1
+    if found:
+        NUMBERS[:] = max(0, found[0] - 100), max(NUMBERS[1], found[-1])
 
 
 def print_regions(pad, info):
     buffer = info.get_buffer()
-    for region in regions_of(buffer):
+    for number, region in regions_of(buffer):
         line = (f'{buffer.pts / Gst.SECOND:8.2f} s: x {region.x}, y {region.y}, '
                 f'w {region.w}, h {region.h}')
         details = region.get_param('foreground')
         if details:
             line += (f', area {details.get_uint("area").value}, '
                      f'mean residual {details.get_double("mean-residual").value:.1f}')
-        print(line)
+        print(f'{line}, number {number}')
     return Gst.PadProbeReturn.OK
 
 

@@ -213,6 +213,7 @@ bool start(State& state) {
   const guint left_out = state.settings.ignored_left_out;
   GST_OBJECT_UNLOCK(self);
   warn_of_rectangles(self, left_out);
+  state.objects.begin_numbers();
   {
     const std::lock_guard lock(state.engine_lock);
     state.background.forget();
@@ -289,12 +290,16 @@ void before_event(State& state, GstEvent* event) {
       drop_frames(state);
       break;
     case GST_EVENT_SEGMENT:
+      drain(state);
+      state.objects.cut_off(state.element);
+      break;
     case GST_EVENT_SEGMENT_DONE:
     // Nothing more may come for long.
     case GST_EVENT_STREAM_GROUP_DONE:
     case GST_EVENT_EOS:
       // The flow of these frames is not the event's: EOS goes on whatever they met.
       drain(state);
+      if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) state.objects.cut_off(state.element);
       break;
     case GST_EVENT_GAP:
       // Frames do not wait for those that do not come.

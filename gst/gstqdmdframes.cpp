@@ -78,17 +78,18 @@ static void forget_frames(State& state) {
 }
 
 void drop_frames(State& state) {
-  const std::lock_guard lock(state.engine_lock);
-  state.background.keep(state.engine);
-  state.engine.flush();
-  forget_frames(state);
+  {
+    const std::lock_guard lock(state.engine_lock);
+    state.background.keep(state.engine);
+    state.engine.flush();
+    forget_frames(state);
+  }
+  state.objects.cut_off(state.element);
 }
 
 void close(State& state) {
   drop_frames(state);
-  state.mask = {};
-  state.residual = {};
-  state.regions = {};
+  state.objects.close();
   GST_OBJECT_LOCK(state.element);
   state.configure_asked = true;
   GST_OBJECT_UNLOCK(state.element);
@@ -238,28 +239,9 @@ static Wishes wishes_of(const Settings& settings, GstBuffer* buffer) {
   return wishes;
 }
 
-static const std::vector<Region>& regions_of(LeavingFrame* frame, State& state, int least_area) {
-  const GstVideoInfo* info = &state.info;
-  const int width = GST_VIDEO_INFO_WIDTH(info), height = GST_VIDEO_INFO_HEIGHT(info);
-  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  state.mask.resize(pixels);
-  state.residual.resize(pixels);
-  frame->foreground(state.mask.data(), state.residual.data());
-  return state.regions.find(state.mask.data(), state.residual.data(), width, height, least_area);
-}
-
-static void attach(GstBuffer* buffer, const std::vector<Region>& regions) {
-  gint id = 0;
-  for (const Region& region : regions) {
-    auto* meta = gst_buffer_add_video_region_of_interest_meta(buffer, "foreground", guint(region.x),
-                                                              guint(region.y), guint(region.width),
-                                                              guint(region.height));
-    // Languages that cannot walk through metadata ask for a number.
-    meta->id = id++;
-    gst_video_region_of_interest_meta_add_param(
-        meta, gst_structure_new("foreground", "area", G_TYPE_UINT, guint(region.area),
-                                "mean-residual", G_TYPE_DOUBLE, region.mean_residual, nullptr));
-  }
+// Somebody wants to know of regions, or of what becomes of things.
+static bool wants_objects(const Settings& settings) {
+  return settings.regions || settings.object_messages;
 }
 
 void send_events(State& state) {
@@ -290,7 +272,9 @@ GstFlowReturn next_pictures(State& state, OutputPictures* pictures) {
     drop_frames(state);
     return flow;
   }
-  const std::vector<Region>* regions = nullptr;
+  // Who has no picture still hears of things.
+  const bool objects = settings.object_messages || (settings.regions && !pictures->empty());
+  if (!objects) state.objects.cut_off(state.element);
   Pose pose;
   News news;
   {
@@ -310,8 +294,7 @@ GstFlowReturn next_pictures(State& state, OutputPictures* pictures) {
       const Wishes wishes = wishes_of(settings, shell.get());
       LeavingFrame* const frame = engine.next(&wishes);
       pose = frame->pose();
-      if (settings.regions && mapped > 0)
-        regions = &regions_of(frame, state, settings.regions_min_area);
+      if (objects) state.objects.look(frame, settings, *state.segment, GST_BUFFER_PTS(shell.get()));
       size_t next = 0;
       for (const OutputPicture& picture : *pictures)
         frame->write(picture.output, levels_of(*picture.info), frames[next++]->view<uint8_t>());
@@ -324,8 +307,10 @@ GstFlowReturn next_pictures(State& state, OutputPictures* pictures) {
       return GST_FLOW_ERROR;
     }
   }
-  if (regions)
-    for (const OutputPicture& picture : *pictures) attach(picture.buffer.get(), *regions);
+  if (objects) {
+    for (const OutputPicture& picture : *pictures) state.objects.attach(picture.buffer.get());
+    state.objects.tell(state.element, state.info);
+  }
   tell_of_solves(state, news);
   tell_of_camera(state, pose, GST_BUFFER_PTS(shell.get()));
   return GST_FLOW_OK;
@@ -396,6 +381,8 @@ static void warn_of_settings_without_effect(State& state, const Settings& settin
 bool configure(State& state, const Settings& settings, const GstVideoInfo& info, GstCaps* caps) {
   warn_of_settings_without_effect(state, settings);
   forget_frames(state);
+  state.objects.cut_off(state.element);
+  state.objects.begin(info, settings.engine.mode == Mode::live);
   state.info = info;
   state.solves_told = 0;
   state.told_ready = false;
@@ -463,6 +450,7 @@ GstFlowReturn prepare_for(State& state, GstBuffer* input) {
     if (!reset) GST_DEBUG_OBJECT(state.element, "time jumps back: a new window begins");
     const GstFlowReturn flow = drain(state);
     if (!state.goes_on(flow)) return flow;
+    state.objects.cut_off(state.element);
   }
   if (reset) {
     drop_frames(state);
@@ -520,7 +508,7 @@ GstFlowReturn take_frame(State& state, BufferPtr buffer) {
   const Settings settings = state.settings;
   GST_OBJECT_UNLOCK(state.element);
   warn_of_areas_outside(state, settings);
-  const bool masks = settings.regions || state.wants_masks(settings);
+  const bool masks = wants_objects(settings) || state.wants_masks(settings);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(
       shell.get(), buffer.get(),

@@ -181,7 +181,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_boolean("regions", "Regions",
                                    "Attach a GstVideoRegionOfInterestMeta of type `foreground` to "
-                                   "each output buffer for each region of foreground",
+                                   "each output buffer for each region of foreground; its id is "
+                                   "the same from frame to frame",
                                    d.regions, kAnyTime);
      },
      QDMD_BOOLEAN(s.regions)},
@@ -271,6 +272,56 @@ const Property kProperties[] = {
                                    d.wishes.stabilize_output, kControllable);
      },
      QDMD_BOOLEAN(s.wishes.stabilize_output)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean(
+           "object-messages", "Messages of objects",
+           "Post an element message `qdmdbackground-object` for each thing that appeared, stopped, "
+           "was left behind or removed, moved on or is gone, and when motion begins and ends",
+           d.object_messages, kAnyTime);
+     },
+     QDMD_BOOLEAN(s.object_messages)},
+    {[](const Settings& d) {
+       return g_param_spec_boolean("object-snapshots", "Snapshots of objects",
+                                   "Messages of objects have the frame, cut to the object's box, "
+                                   "as a GstSample `snapshot`",
+                                   d.object_snapshots, kAnyTime);
+     },
+     QDMD_BOOLEAN(s.object_snapshots)},
+    {[](const Settings& d) {
+       return g_param_spec_double("object-min-size", "Least size of objects",
+                                  "Longer side of the box of an object, in parts of the picture's "
+                                  "height: what is smaller is told of by no message",
+                                  0, 1, d.object_min_size, kAnyTime);
+     },
+     QDMD_DOUBLE(s.object_min_size)},
+    {[](const Settings& d) {
+       return g_param_spec_double("object-appear-time", "Time in which objects appear",
+                                  "Seconds for which something is seen before it is told that it "
+                                  "appeared, three frames at least",
+                                  0, 1e6, d.object_appear_time, kAnyTime);
+     },
+     QDMD_DOUBLE(s.object_appear_time)},
+    {[](const Settings& d) {
+       return g_param_spec_double("object-stop-time", "Time in which objects stop",
+                                  "Seconds for which an object stands before it is told that it "
+                                  "stopped or was left behind, three frames at least",
+                                  0, 1e6, d.object_stop_time, kAnyTime);
+     },
+     QDMD_DOUBLE(s.object_stop_time)},
+    {[](const Settings& d) {
+       return g_param_spec_double("object-gone-time", "Time after which objects are gone",
+                                  "Seconds for which no frame shows an object before it is told "
+                                  "that it is gone, three frames at least",
+                                  0, 1e6, d.object_gone_time, kAnyTime);
+     },
+     QDMD_DOUBLE(s.object_gone_time)},
+    {[](const Settings& d) {
+       return g_param_spec_double("motion-end-time", "Time after which motion ends",
+                                  "Seconds for which nothing moves in the picture before it is "
+                                  "told that motion ends",
+                                  0, 1e6, d.motion_end_time, kAnyTime);
+     },
+     QDMD_DOUBLE(s.motion_end_time)},
 };
 
 }  // namespace

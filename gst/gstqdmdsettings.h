@@ -8,6 +8,7 @@
 #include "core/engine/engine_options.h"
 #include "core/engine/wishes.h"
 #include "core/foreground/picture.h"
+#include "core/objects/object.h"
 
 namespace qdmd {
 
@@ -22,8 +23,14 @@ inline constexpr guint kMostSettings = 128;
 
 struct Settings {
   Output output = Output::background;
-  bool post_messages = false, regions = false;
-  int regions_min_area = 0;    // pixels
+  bool post_messages = false, regions = false, object_messages = false, object_snapshots = false;
+  int regions_min_area = 0;  // pixels
+  // Parts of the picture's height; seconds.
+  double object_min_size = ObjectOptions().min_size;
+  double object_appear_time = ObjectOptions().appear_seconds;
+  double object_stop_time = ObjectOptions().stop_seconds;
+  double object_gone_time = ObjectOptions().gone_seconds;
+  double motion_end_time = ObjectOptions().grace_seconds;
   double time_budget = 0;      // milliseconds a frame; 0: no limit
   double absorb_time = 300;    // seconds; 0: never
   guint ignored_left_out = 0;  // rectangles that are none, or too many

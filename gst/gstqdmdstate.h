@@ -7,12 +7,11 @@
 #include <bitset>
 #include <memory>
 #include <mutex>
-#include <vector>
 
 #include "core/engine/engine.h"
-#include "core/foreground/regions.h"
 #include "core/model/learnt.h"
 #include "gst/backgroundsample.h"
+#include "gst/gstqdmdobjects.h"
 #include "gst/gstqdmdsettings.h"
 #include "gst/latency.h"
 #include "gst/pointers.h"
@@ -104,8 +103,7 @@ class State {
   // The metadata of the frames that the engine holds: buffers without memory, so that upstream's
   // pools never wait for a window.
   WaitingFrames shells;
-  std::vector<guint8> mask, residual;  // for regions
-  RegionFinder regions;
+  ObjectWatch objects;
   guint64 solves_told = 0, scenes_told = 0, views_told = 0;  // of the engine's
   bool warned_of_no_room = false;
   bool told_ready = false;    // the newest solve's exposure had settled, and somebody was told

@@ -38,6 +38,14 @@ uint64_t LeavingFrame::soft_bytes() const {
 
 Pose LeavingFrame::pose() const { return frames().pose(slot()); }
 
+bool LeavingFrame::next_uncovered(UncoveredPlace* place) {
+  meet();
+  UncoveredPlaces* const places = stage_.background->learner().uncovered();
+  const int64_t number =
+      static_cast<int64_t>(frames().frames_taken()) - frames().size() + schedule_->next_index();
+  return places && places->take(number, place);
+}
+
 // Once a frame.
 void LeavingFrame::meet() {
   if (done_.meet) return;
@@ -129,14 +137,33 @@ void LeavingFrame::write(Output output, const Levels& levels, const MutableImage
     }
     if (masked && wishes().mask_softness > 0) soften(&task);
     return_to_camera(&task, output == Output::background || output == Output::foreground);
-    const Band& band = frames().band();
-    const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
-    const int steps = (height + together - 1) / together;
-    const auto write = [&](int first, int count) {
-      const int row = first * together;
-      write_picture(task, levels, out, top + row, std::min(count * together, height - row));
-    };
-    for_rows(pool(), steps, frames().window().pixels(), write);
+    write(task, levels, out);
+  });
+}
+
+void LeavingFrame::write(const OutputTask& task, const Levels& levels,
+                         const MutableImageView& out) {
+  const Band& band = frames().band();
+  const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
+  const int steps = (height + together - 1) / together;
+  const auto write = [&](int first, int count) {
+    const int row = first * together;
+    write_picture(task, levels, out, top + row, std::min(count * together, height - row));
+  };
+  for_rows(pool(), steps, frames().window().pixels(), write);
+}
+
+void LeavingFrame::write_frame(const Levels& levels, const MutableImageView& out) {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::cutout);
+    read();
+    // All of it is cut out.
+    everything_.resize(frames().window().pixels(), 255);
+    if (!pose().is_rest() && !wishes().stabilize_output)
+      for (int c = 0; c < kChannels; ++c) task.x[c] = frames().untouched(slot(), c);
+    task.mask = everything_.data();
+    write(task, levels, out);
   });
 }
 
@@ -146,6 +173,16 @@ const uint8_t* LeavingFrame::whole_mask() {
     OutputTask task = task_of(Output::mask);
     decide(&task);
     return stage_.background->decision().whole_mask();
+  });
+}
+
+const uint8_t* LeavingFrame::mask() {
+  const Clock::Span span(*stage_.clock, Clock::frames);
+  return flushed_if_it_throws(this, [&] {
+    OutputTask task = task_of(Output::mask);
+    decide(&task);
+    return_to_camera(&task, false);
+    return task.mask;
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/engine/schedule.h"
 #include "core/foreground/picture.h"
@@ -28,11 +29,20 @@ class LeavingFrame {
   // The mask of the whole picture, even if a team shares it: 255 where foreground, else 0,
   // width * height samples in row order. Good until skip().
   const uint8_t* whole_mask();
-  // Gives the mask, as in Output::mask, and the lengths of the residuals in levels, at most 255;
+  // The mask, as in Output::mask but hard: 255 where foreground, else 0, width * height samples in
+  // row order. Good until the next call.
+  const uint8_t* mask();
+  // Gives the same, and the lengths of the residuals in levels, at most 255;
   // width * height samples each.
   void foreground(uint8_t* mask, uint8_t* residual);
+  // Writes the frame as it came (on the canvas, if pictures are steady), like write().
+  void write_frame(const Levels& levels, const MutableImageView& out);
   // Where the camera looked.
   Pose pose() const;
+  // The next place, each once, where this frame and those before it show that something has left
+  // which belonged to the background; places are those of the canvas. False: there is none.
+  // Method::robust only.
+  bool next_uncovered(UncoveredPlace* place);
   // It leaves. Call it once its pictures are written, if anybody wants some.
   void skip();
   // write() in the configured levels, and skip().
@@ -54,6 +64,7 @@ class LeavingFrame {
   void read();
   void decide(OutputTask* task);
   void soften(OutputTask* task);
+  void write(const OutputTask& task, const Levels& levels, const MutableImageView& out);
   void return_to_camera(OutputTask* task, bool level);
   FrameStore& frames() const { return *stage_.frames; }
   const Wishes& wishes() const { return stage_.background->wishes(); }
@@ -65,6 +76,7 @@ class LeavingFrame {
   Levels levels_;
   std::unique_ptr<SoftMask> soft_mask_;
   Done done_;
+  std::vector<uint8_t> everything_;  // a mask that is set everywhere, once somebody wants a frame
   // The planes. Where pixels share samples, `room_` has those of each pixel.
   PlaneRows planes_;
   std::unique_ptr<uint8_t[]> room_;

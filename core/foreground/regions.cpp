@@ -43,12 +43,9 @@ void merge_overlapping(std::vector<Region>* regions) {
   }
 }
 
-// A strip along one edge, less than `reach` wide: the first rows or columns of something that comes
-// in, which has a box with the next frames, or a rim that a camera's movement leaves.
-bool is_strip_at_edge(const Region& r, int width, int height, int reach) {
-  const bool left = r.x == 0, right = r.x + r.width == width;
-  const bool top = r.y == 0, bottom = r.y + r.height == height;
-  return (r.width < reach && left != right) || (r.height < reach && top != bottom);
+// Pixels that are less than this apart are near to each other.
+int reach_of(int width, int height) {
+  return 2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
 }
 
 // The largest first; of equals the one that begins further up, or further to the left.
@@ -76,6 +73,13 @@ struct Pixels {
 
 }  // namespace
 
+bool is_strip_at_edge(const Region& r, int width, int height) {
+  const int reach = reach_of(width, height);
+  const bool left = r.x == 0, right = r.x + r.width == width;
+  const bool top = r.y == 0, bottom = r.y + r.height == height;
+  return (r.width < reach && left != right) || (r.height < reach && top != bottom);
+}
+
 struct RegionFinder::Memory {
   // Pixels of a row, from left to right, of which each is at most `reach` right of the one before.
   // If the spans of two are at most `reach` apart, so are two of their pixels: the end of one lies
@@ -100,7 +104,8 @@ void RegionFinder::Memory::find_stretches(const uint8_t* mask, const uint8_t* re
   for (int begin = next_of(mask, 0, width, 255), end; begin < width;
        begin = next_of(mask, end, width, 255)) {
     end = next_of(mask, begin, width, 0);
-    const int64_t sum = std::accumulate(residual + begin, residual + end, int64_t{0});
+    const int64_t sum =
+        residual ? std::accumulate(residual + begin, residual + end, int64_t{0}) : 0;
     const Pixels run = {begin, end, y, y + 1, end - begin, sum};
     if (stretches.size() > first && begin - stretches.back().right < reach) {
       stretches.back().add(run);
@@ -129,15 +134,14 @@ RegionFinder& RegionFinder::operator=(RegionFinder&&) noexcept = default;
 RegionFinder::~RegionFinder() = default;
 
 const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t* residual,
-                                              int width, int height, int least_area) {
+                                              int width, int height, int least_area, bool apart) {
   if (!memory_) memory_ = std::make_unique<Memory>();
   auto& [stretches, rows, named, regions] = *memory_;
   stretches.clear(), rows.clear(), named.clear(), regions.clear();
-  const int reach =
-      2 * std::max(1, static_cast<int>(std::lround(std::min(width, height) / 120.0))) + 1;
+  const int reach = reach_of(width, height);
   for (int y = 0; y < height; ++y) {
     const size_t first = static_cast<size_t>(y) * static_cast<size_t>(width);
-    memory_->find_stretches(mask + first, residual + first, width, y, reach);
+    memory_->find_stretches(mask + first, residual ? residual + first : nullptr, width, y, reach);
   }
   rows.push_back(stretches.size());
   for (int y = 1; y < height; ++y)
@@ -156,10 +160,10 @@ const std::vector<Region>& RegionFinder::find(const uint8_t* mask, const uint8_t
   }
   std::sort(regions.begin(), regions.end(), comes_before);
   if (regions.size() > kMostRegions) regions.resize(kMostRegions);
+  if (apart) return regions;
   merge_overlapping(&regions);
   if (least_area == 0)
-    std::erase_if(regions,
-                  [&](const Region& r) { return is_strip_at_edge(r, width, height, reach); });
+    std::erase_if(regions, [&](const Region& r) { return is_strip_at_edge(r, width, height); });
   std::sort(regions.begin(), regions.end(), comes_before);
   return regions;
 }

@@ -11,6 +11,7 @@
 #include "core/frames/frame_store.h"
 #include "core/learn/method.h"
 #include "core/learn/robust/learning_steps.h"
+#include "core/learn/uncovered.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
 #include "core/parallel/band.h"
@@ -136,6 +137,9 @@ class Learner {
   // frames that are compared from now on find that, if it may be mended. t: the time of the one
   // that is compared next.
   virtual void look_ahead(const Compared& /*frame*/, BackgroundModel* /*model*/) {}
+  // Where the frames that were looked at show that something has left. Null: the method does not
+  // know.
+  virtual UncoveredPlaces* uncovered() { return nullptr; }
   // Takes effect with the next frame. 0: never.
   virtual void set_absorb_frames(int64_t) {}
 

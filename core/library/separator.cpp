@@ -1,6 +1,8 @@
 #include "core/library/separator.h"
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -8,10 +10,12 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "core/engine/engine.h"
 #include "core/foreground/regions.h"
 #include "core/model/learnt_file.h"
+#include "core/objects/object_tracker.h"
 
 namespace qdmd::library {
 namespace {
@@ -135,6 +139,40 @@ Kind kind_of(const Layout& layout) {
           layout.depth};
 }
 
+ObjectOptions object_options(const Options& options) {
+  ObjectOptions result;
+  result.min_size = options.object_min_size;
+  result.appear_seconds = options.appear_seconds;
+  result.stop_seconds = options.stop_seconds;
+  result.gone_seconds = options.gone_seconds;
+  result.grace_seconds = options.motion_end_seconds;
+  return result;
+}
+
+Event event_of(qdmd::ObjectEvent::Kind kind) {
+  using Told = qdmd::ObjectEvent::Kind;
+  switch (kind) {
+    case Told::appeared:
+      return Event::appeared;
+    case Told::stopped:
+      return Event::stopped;
+    case Told::left_behind:
+      return Event::left_behind;
+    case Told::removed:
+      return Event::removed;
+    case Told::moved_on:
+      return Event::moved_on;
+    case Told::gone:
+      return Event::gone;
+    case Told::motion_begins:
+      return Event::motion_begins;
+    default:
+      return Event::motion_ends;
+  }
+}
+
+int whole(double length) { return static_cast<int>(std::lround(length)); }
+
 void check(const Status& status) {
   if (!status.ok()) throw std::invalid_argument(status.message);
 }
@@ -165,6 +203,7 @@ struct Separator::State {
     check(engine.configure(engine_options(options, wanted), wanted.width, wanted.height));
     kind = wanted;
     if (loaded) check(engine.learn_from(*loaded));
+    end();
   }
 
   // What was loaded before the first frame belongs to frames like these.
@@ -185,6 +224,70 @@ struct Separator::State {
     return *frame;
   }
 
+  void write(LeavingFrame* frame, Output output, const Layout& layout, void* picture);
+
+  // Its objects, once a frame.
+  void follow(LeavingFrame* frame) {
+    if (!options.follow_objects || followed) return;
+    const ObjectOptions its = object_options(options);
+    const std::vector<qdmd::Region>& regions =
+        finder.find(frame->mask(), nullptr, kind.width, kind.height,
+                    ObjectTracker::least_area(kind.height, its), true);
+    // From a billion frames per second to one a day.
+    const double step = std::clamp(1 / options.frame_rate, 1e-9, 86400.0);
+    removed.clear();
+    const Pose pose = options.stabilize_output ? Pose() : frame->pose();
+    UncoveredPlace place;
+    while (options.mode == Mode::live && frame->next_uncovered(&place))
+      removed.push_back({{place.x - pose.x, place.y - pose.y, static_cast<double>(place.width),
+                          static_cast<double>(place.height)},
+                         static_cast<double>(place.stood) * step});
+    now = std::llround(static_cast<double>(frames) * step * kSecond);
+    waiting = tracker.push({regions, removed, now, 0});
+    followed = true;
+  }
+
+  // Returns its number.
+  uint64_t skip(LeavingFrame* frame) {
+    frame->skip();
+    followed = false;
+    return frames++;
+  }
+
+  Object object_of(const qdmd::Object& its) const {
+    const auto seconds = [this](int64_t since) {
+      return since == kNoTime ? 0 : static_cast<double>(now - since) / kSecond;
+    };
+    return {its.id,
+            whole(its.box.x),
+            whole(its.box.y),
+            whole(its.box.width),
+            whole(its.box.height),
+            its.area,
+            std::hypot(its.vx, its.vy),
+            seconds(its.first_time),
+            seconds(its.standing_since),
+            its.appeared};
+  }
+
+  void tell_all(uint64_t number) {
+    const std::vector<qdmd::ObjectEvent> events = std::exchange(waiting, {});
+    if (!tell) return;
+    for (const qdmd::ObjectEvent& event : events) {
+      const bool has_object = event.object.id > 0;
+      tell({event_of(event.kind), has_object ? object_of(event.object) : Object{}, number,
+            event.cut_off});
+    }
+  }
+
+  // Frames to come are of another time, and may have another size.
+  void end() {
+    if (!options.follow_objects) return;
+    waiting = tracker.end();
+    tracker.begin(kind.width, kind.height, object_options(options));
+    tell_all(frames);
+  }
+
   Options options;
   Wishes wishes;
   Kind kind;
@@ -192,6 +295,13 @@ struct Separator::State {
   std::optional<Learnt> loaded;
   std::vector<uint8_t> mask, residual;
   RegionFinder finder;
+  ObjectTracker tracker;
+  std::vector<RemovedPlace> removed;
+  std::vector<qdmd::ObjectEvent> waiting;
+  std::function<void(const ObjectEvent&)> tell;
+  uint64_t frames = 0;    // that left
+  bool followed = false;  // objects of the frame that leaves next
+  int64_t now = 0;
   // The last member: its threads end before the rest.
   Engine engine;
 };
@@ -214,24 +324,31 @@ void Separator::push(const void* frame, const Layout& layout) {
   check_layout(frame, layout);
   if (ready()) throw std::invalid_argument("skip() the frames that are ready before you push more");
   state_->configure(kind_of(layout));
+  // A frame whose objects were followed was lost.
+  if (std::exchange(state_->followed, false)) ++state_->frames;
   check(state_->engine.push(view_of(static_cast<const uint8_t*>(frame), layout), &state_->wishes));
   state_->loaded.reset();
 }
 
 bool Separator::ready() const { return state_->engine.next() != nullptr; }
 
-void Separator::write(Output output, const Layout& layout, void* picture) {
-  check_layout(picture, layout);
-  LeavingFrame& leaving = state_->leaving();
-  const Kind& kind = state_->kind;
+void Separator::State::write(LeavingFrame* frame, Output output, const Layout& layout,
+                             void* picture) {
   if (layout.width != kind.width || layout.height != kind.height)
     throw std::invalid_argument("a picture has the size of the frames");
   if (layout.depth != 8 && layout.depth != kind.depth)
     throw std::invalid_argument("a picture has the depth of the frames, or 8 bits");
   if (layout.pixels == Pixels::grey && kind.colours != Colours::grey && output != Output::mask)
     throw std::invalid_argument("of frames with colours only the mask can be grey");
-  leaving.write(static_cast<qdmd::Output>(output), Levels(),
-                view_of(static_cast<uint8_t*>(picture), layout));
+  follow(frame);
+  frame->write(static_cast<qdmd::Output>(output), Levels(),
+               view_of(static_cast<uint8_t*>(picture), layout));
+}
+
+void Separator::write(Output output, const Layout& layout, void* picture) {
+  check_layout(picture, layout);
+  state_->write(&state_->leaving(), output, layout, picture);
+  state_->tell_all(state_->frames);
 }
 
 std::vector<Region> Separator::regions(int least_area) {
@@ -250,7 +367,11 @@ std::vector<Region> Separator::regions(int least_area) {
   return regions;
 }
 
-void Separator::skip() { state_->leaving().skip(); }
+void Separator::skip() {
+  LeavingFrame& leaving = state_->leaving();
+  state_->follow(&leaving);
+  state_->tell_all(state_->skip(&leaving));
+}
 
 void Separator::drain() {
   if (state_->engine.configured()) check(state_->engine.drain());
@@ -267,8 +388,10 @@ void Separator::apply(const void* frame, const Layout& layout, uint8_t* mask,
   of_mask.depth = 8;
   check_layout(mask, of_mask);
   push(frame, layout);
-  write(Output::mask, of_mask, mask);
-  skip();
+  LeavingFrame& leaving = state_->leaving();
+  state_->write(&leaving, Output::mask, of_mask, mask);
+  // Who is told may throw: the frame has left by then.
+  state_->tell_all(state_->skip(&leaving));
 }
 
 bool Separator::background(const Layout& layout, void* picture) {
@@ -299,7 +422,22 @@ void Separator::reset() {
   // flush() would keep when solves are due.
   state_->engine.close();
   state_->kind = {};
+  state_->end();
 }
+
+std::vector<Object> Separator::objects() const {
+  std::vector<Object> all;
+  if (state_->options.follow_objects)
+    for (const qdmd::Object& object : state_->tracker.objects())
+      all.push_back(state_->object_of(object));
+  return all;
+}
+
+void Separator::on_event(std::function<void(const ObjectEvent&)> tell) {
+  state_->tell = std::move(tell);
+}
+
+void Separator::end() { state_->end(); }
 
 std::vector<uint8_t> Separator::save() {
   Learnt learnt;
@@ -329,6 +467,7 @@ void Separator::load(const uint8_t* bytes, size_t size) {
   its.kind = kind;
   its.loaded = std::move(learnt);
   check(its.engine.learn_from(*its.loaded));
+  its.end();
 }
 
 void Separator::save(const std::string& file) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -52,10 +53,18 @@ struct Options {
   int mask_softness = 0;          // pixels over which the edge of a mask fades, up to 15
   std::vector<Rectangle> ignore;  // at most 64: nothing is foreground there
   int absorb_frames = 7500;       // until what came and stands is background; 0: never
-  double frame_rate = 25;         // frames per second; below 5 masks treat them as a time lapse
-  double time_budget = 0;         // milliseconds that a frame may take on average; 0: no limit
-  int threads = 0;                // up to 256; 0: one for each core. Changes no result
+  // Frames per second: below 5 masks treat them as a time lapse. Times of objects are counted by
+  // it.
+  double frame_rate = 25;
+  double time_budget = 0;  // milliseconds that a frame may take on average; 0: no limit
+  int threads = 0;         // up to 256; 0: one for each core. Changes no result
   uint64_t max_memory = uint64_t{4} << 30;  // bytes
+  // Things are followed: objects() and on_event().
+  bool follow_objects = false;
+  double object_min_size = 1.0 / 60;  // longer side of what is told of, parts of the height
+  // Seconds, as qdmdbackground's properties object-appear-time, object-stop-time, object-gone-time
+  // and motion-end-time.
+  double appear_seconds = 0.2, stop_seconds = 2, gone_seconds = 1, motion_end_seconds = 3;
 };
 
 // What the samples of a pixel are, in this order. Alpha is taken along and decides nothing.
@@ -86,6 +95,34 @@ struct Region {
   double mean_residual = 0;                 // of these: levels from the background
 };
 
+// A thing in the newest frame that left, by its number, which no other thing of the separator has.
+struct Object {
+  int id;
+  int x, y, width, height;  // pixels
+  int area;                 // foreground pixels
+  double speed;             // pixels a second
+  double age, standing;  // seconds since it was first seen, and for which it has stood; 0: it moves
+  bool appeared;         // on_event() was told of it
+};
+
+enum class Event {
+  appeared,       // a thing, and no leaf or speck, was seen for appear_seconds
+  stopped,        // it came here and stands for stop_seconds
+  left_behind,    // it stands, never moved, and what brought it went stop_seconds ago
+  removed,        // something that belonged to the background was taken; Mode::live only
+  moved_on,       // what stopped, or was left behind, goes on
+  gone,           // nothing showed it for gone_seconds
+  motion_begins,  // something moves in the picture; of no object
+  motion_ends     // nothing has moved for motion_end_seconds; of no object
+};
+
+struct ObjectEvent {
+  Event event;
+  Object object;   // all 0 where it is of none
+  uint64_t frame;  // the frame it is told with; the first that left is 0, whatever was reset since
+  bool cut_off;    // gone and motion_ends: frames ended before
+};
+
 // Separates the frames of one camera, in their order. All calls come from one thread at a time.
 // Throws std::invalid_argument with a sentence that says what to change where options, a layout or
 // bytes are refused: nothing has changed then. Throws std::bad_alloc where memory runs out: all is
@@ -111,7 +148,8 @@ class [[gnu::visibility("default")]] Separator {
   // the frame's, or 8: the highest bits. Only masks of frames with colours can be grey.
   void write(Output output, const Layout& layout, void* picture);
   // The regions of its foreground, the largest first, 64 at most. least_area: pixels of foreground
-  // that a region has at least; 0: 1/2000 of the picture, at least 4.
+  // that a region has at least; 0: 1/2000 of the picture, at least 4, and no narrow strips along an
+  // edge.
   std::vector<Region> regions(int least_area = 0);
   void skip();
   // No frame follows: makes all frames ready that wait. The next one begins a new window.
@@ -125,8 +163,20 @@ class [[gnu::visibility("default")]] Separator {
   void freeze(bool freeze);
   // Options::ignore from the next frame on.
   void ignore(const std::vector<Rectangle>& areas);
-  // Forgets the frames, the window and the background.
+  // Forgets the frames, the window and the background, and objects as end() does.
   void reset();
+
+  // What the newest frame shows of which a picture was written, or that left, if
+  // Options::follow_objects.
+  std::vector<Object> objects() const;
+  // Called with each event of a frame, once: by the first write(), when the picture is written, or
+  // else by skip(); by apply(), once the mask is written; and by end(). It may call nothing of the
+  // separator but objects(). Empty: nobody is told.
+  void on_event(std::function<void(const ObjectEvent&)> tell);
+  // No frame comes any more, or the next is of another time: each object that appeared is gone, cut
+  // off. Mode::batch: drain() first, and let the frames leave. reset() does so, too, and a frame
+  // of another size, depth or kind of colours.
+  void end();
 
   // What was learnt, as the bytes of a file of the signal `save` of qdmdbackground; empty where
   // nothing is learnt yet.

@@ -65,7 +65,7 @@ void Crossing::place(double time, std::vector<Placement>* placements) const {
   const double way = moving / kCrossing * (width_ + person.width() + 2 * beyond);
   const double x = forward ? way - person.width() - beyond : width_ + beyond - way;
   placements->push_back({&person.at(way, forward), static_cast<int>(std::lround(x)),
-                         static_cast<int>(std::lround(feet)) - person.height()});
+                         static_cast<int>(std::lround(feet)) - person.height(), false, number});
 }
 
 }  // namespace qdmd::scene

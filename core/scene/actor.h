@@ -15,6 +15,8 @@ struct Placement {
   int x = 0, y = 0;
   // The truth has it in the background: it has not moved yet.
   bool part_of_background = false;
+  // Who of its actor's it is: the same from frame to frame.
+  int64_t who = 0;
 
   int feet() const { return y + sprite->height(); }
   // Around the opaque pixels.

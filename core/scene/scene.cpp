@@ -113,7 +113,13 @@ double Scene::metered(double time) {
 // Whoever is there, the farthest first.
 void Scene::place(double time) {
   placements_.clear();
-  for (const auto& actor : plan_.actors) actor->place(time, &placements_);
+  for (size_t actor = 0; actor < plan_.actors.size(); ++actor) {
+    size_t next = placements_.size();
+    plan_.actors[actor]->place(time, &placements_);
+    // Numbers of one actor are below 2^40 in size.
+    for (; next < placements_.size(); ++next)
+      placements_[next].who += static_cast<int64_t>(actor) << 42;
+  }
   for (size_t i = 1; i < placements_.size(); ++i)
     for (size_t k = i; k > 0 && placements_[k].feet() < placements_[k - 1].feet(); --k)
       std::swap(placements_[k], placements_[k - 1]);
@@ -161,6 +167,7 @@ void Scene::paint_objects() {
 
 void Scene::find_boxes() {
   boxes_.clear();
+  owners_.clear();
   for (const Placement& placement : placements_) {
     if (placement.part_of_background) continue;
     const Corners whole = seen_corners(placement.box(), state_);
@@ -170,7 +177,9 @@ void Scene::find_boxes() {
     const int bottom = static_cast<int>(std::ceil(whole.bottom));
     const Box seen =
         intersection({left, top, right - left, bottom - top}, {0, 0, state_.width, state_.height});
-    if (!seen.empty()) boxes_.push_back(seen);
+    if (seen.empty()) continue;
+    boxes_.push_back(seen);
+    owners_.push_back(static_cast<uint64_t>(placement.who));
   }
 }
 

@@ -52,6 +52,8 @@ class Scene {
   // One for every object of which some pixel may be in the frame, without the blur of lens and
   // shutter.
   const std::vector<Box>& boxes() const { return boxes_; }
+  // Whose boxes these are: a number that one person or thing has in all frames, and no other.
+  const std::vector<uint64_t>& owners() const { return owners_; }
   const Light& light() const { return state_.light; }
   // Pixels by which the camera looks to the right and down of its place, and radians by which it is
   // turned clockwise around the middle of the frame: the frame's pixel (x, y) shows the world at
@@ -85,6 +87,7 @@ class Scene {
   Picture cropped_, arrived_;
   Plane cropped_plane_;
   std::vector<Box> boxes_;
+  std::vector<uint64_t> owners_;
   std::array<double, 3> backdrop_mean_{};
 };
 

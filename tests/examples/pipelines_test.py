@@ -122,7 +122,7 @@ def check_command(language, line, folder):
     assert words[0] == 'gst-launch-1.0', 'only commands that begin with gst-launch-1.0 are run'
     operators = {'|', '||', '&', '&&', ';', '>', '<', '2>'}.intersection(words)
     assert not operators, f'{operators} would need a shell'
-    words = with_stand_ins([word for word in words[1:] if word not in ('-e', '-q', '-v')])
+    words = with_stand_ins([word for word in words[1:] if word not in ('-e', '-m', '-q', '-v')])
     try:
         sinks = check_is_local(words)
     except common.GLib.Error as error:

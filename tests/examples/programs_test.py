@@ -2,6 +2,7 @@
 
 Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that are built)
 """
+import json
 import pathlib
 import re
 import signal
@@ -14,8 +15,8 @@ import common
 
 # demo.sh installs packages and builds: continuous integration runs it after these tests.
 # subtract.cpp is built and run by tests/install, archive by tests/archive.
-KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'frames.py', 'meson.build', 'pipelines.md', 'record.py', 'subtract.cpp',
-         'two_pads.cpp', 'watch.py'}
+KNOWN = {'archive', 'demo.cpp', 'demo.sh', 'embed.cpp', 'frames.py', 'meson.build', 'pipelines.md', 'record.py', 'recorder.py',
+         'subtract.cpp', 'two_pads.cpp', 'watch.py'}
 WIDTH, HEIGHT = 320, 240
 
 root, embed, demo, two_pads = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
@@ -118,6 +119,31 @@ def watch_errors(folder):
     assert 'no/plate.png' in errors, errors
 
 
+def record_events(folder):
+    said, errors = run(folder, examples / 'recorder.py',
+                       'qdmdscenesrc scene=noise,stop,abandon num-buffers=500', '--output', 'events')
+    lines = [json.loads(line) for line in (folder / 'events' / 'events.jsonl').open()]
+    events = [line['event'] for line in lines]
+    for event in 'motion-begins', 'appeared', 'stopped', 'motion-ends', 'moved-on', 'left-behind':
+        assert event in events, said + errors
+    assert events[0] == 'motion-begins', events
+    assert events.count('motion-begins') == events.count('motion-ends'), events
+    told = [(line['id'], line['event']) for line in lines if line['event'] in ('appeared', 'gone')]
+    assert len(told) == len(set(told)), 'each thing appears once, and is gone once'
+    assert {thing for thing, event in told if event == 'appeared'} == {
+        thing for thing, event in told if event == 'gone'}
+    for line in lines:
+        if 'picture' in line:
+            assert (folder / 'events' / line['picture']).stat().st_size > 300
+    films = {line['film'] for line in lines} - {None}
+    assert len(films) == events.count('motion-begins') > 1, films
+    for film in films:
+        for kind in 'video', 'background', 'mask':
+            path = folder / 'events' / film.replace('video', kind)
+            assert common.count_frames(path) > 40, f'{path} is too short'
+    return f'{len(lines)} events, {len(films)} films'
+
+
 def record_motion(folder):
     recorder = subprocess.Popen([examples / 'record.py', '--output', 'motion.mkv'], cwd=folder,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -186,7 +212,7 @@ def messages_as_documented(folder):
 
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
-              watch_errors, record_motion, record_nothing, record_errors, messages_as_documented,
+              watch_errors, record_events, record_motion, record_nothing, record_errors, messages_as_documented,
               two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)

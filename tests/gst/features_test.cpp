@@ -116,8 +116,8 @@ TEST(Regions, AreTheBoxesOfWhatMoves) {
     EXPECT_EQ(12u, regions[0]->h);
     EXPECT_EQ(90 - left, regions[1]->x);
     EXPECT_EQ(6u, regions[1]->w);
-    EXPECT_EQ(0, regions[0]->id);
-    EXPECT_EQ(1, regions[1]->id);
+    EXPECT_EQ(1, regions[0]->id) << "the same from frame to frame";
+    EXPECT_EQ(2, regions[1]->id);
     const GstStructure* more =
         gst_video_region_of_interest_meta_get_param(regions[0], "foreground");
     ASSERT_NE(nullptr, more);

@@ -196,6 +196,129 @@ TEST(Library, RefusesWhatItCannotDo) {
   EXPECT_EQ(mask.size(), cv::Size(6, 4));
 }
 
+// A red square crosses, stands, and goes out.
+TEST(Objects, AreToldOfAndFollowed) {
+  Options options;
+  options.window_size = 40;
+  options.follow_objects = true;
+  Separator separator(options);
+  std::vector<qdmd::library::ObjectEvent> told;
+  separator.on_event([&](const qdmd::library::ObjectEvent& event) { told.push_back(event); });
+  int id = 0;
+  cv::Mat mask(90, 120, CV_8UC1);
+  for (int t = 0; t < 340; ++t) {
+    cv::Mat frame(90, 120, CV_8UC3);
+    const int left = 2 * (std::min(t, 150) - 120 + std::max(0, t - 230)) - 16;
+    for (int y = 0; y < 90; ++y)
+      for (int x = 0; x < 120; ++x) {
+        const bool inside = x >= left && x < left + 16 && y >= 40 && y < 56;
+        const auto grey = static_cast<uint8_t>(60 + (7 * x + 3 * y) % 80);
+        frame.at<cv::Vec3b>(y, x) = inside ? cv::Vec3b(20, 20, 250) : cv::Vec3b(grey, grey, grey);
+      }
+    separator.apply(frame.data, layout_of(frame), mask.data, static_cast<ptrdiff_t>(mask.step));
+    if (t != 210) continue;
+    const auto objects = separator.objects();
+    ASSERT_EQ(1u, objects.size());
+    id = objects[0].id;
+    EXPECT_EQ(left, objects[0].x);
+    EXPECT_EQ(16, objects[0].width);
+    EXPECT_NEAR(90 / 25.0, objects[0].age, 0.2);
+    EXPECT_NEAR(60 / 25.0, objects[0].standing, 0.2);
+    EXPECT_TRUE(objects[0].appeared);
+  }
+  using qdmd::library::Event;
+  std::vector<Event> of_things;
+  for (const auto& event : told) {
+    if (event.event == Event::motion_begins || event.event == Event::motion_ends) continue;
+    of_things.push_back(event.event);
+    EXPECT_EQ(id, event.object.id);
+    EXPECT_FALSE(event.cut_off);
+  }
+  EXPECT_EQ((std::vector{Event::appeared, Event::stopped, Event::moved_on, Event::gone}),
+            of_things);
+  told.clear();
+  separator.end();
+  EXPECT_TRUE(told.empty() || told[0].event == Event::motion_ends) << "nothing is there any more";
+}
+
+TEST(Objects, AreNotFollowedWithoutBeingAsked) {
+  Separator separator;
+  int told = 0;
+  separator.on_event([&](const qdmd::library::ObjectEvent&) { ++told; });
+  for (const cv::Mat& frame : street(160, 120, 60)) {
+    cv::Mat mask(frame.size(), CV_8UC1);
+    separator.apply(frame.data, layout_of(frame), mask.data, static_cast<ptrdiff_t>(mask.step));
+  }
+  EXPECT_EQ(0, told);
+  EXPECT_TRUE(separator.objects().empty());
+  Options options;
+  options.frame_rate = 0;
+  EXPECT_THROW(Separator{options}, std::invalid_argument);
+}
+
+// A red square on grey comes in at frame 120, and stands from frame 150 on.
+cv::Mat square(int t) {
+  cv::Mat frame(90, 120, CV_8UC3);
+  for (int y = 0; y < 90; ++y)
+    for (int x = 0; x < 120; ++x)
+      frame.at<cv::Vec3b>(y, x) = cv::Vec3b::all(static_cast<uint8_t>(60 + (7 * x + 3 * y) % 80));
+  const int left = 2 * (std::min(t, 150) - 120) - 16;
+  frame(cv::Rect(left, 40, 16, 16) & cv::Rect(0, 0, 120, 90)).setTo(cv::Scalar(20, 20, 250));
+  return frame;
+}
+
+// Frames leave with pictures and without, at once and later.
+TEST(Objects, AreFollowedInEachWayThatFramesLeave) {
+  using qdmd::library::Event;
+  for (const bool batch : {false, true})
+    for (const int pictures : {0, 1, 3}) {
+      Options options;
+      options.window_size = 40;
+      options.follow_objects = true;
+      if (batch) options.mode = qdmd::library::Mode::batch;
+      Separator separator(options);
+      std::vector<std::pair<Event, uint64_t>> told;
+      std::vector<uint64_t> cut_off;
+      separator.on_event([&](const qdmd::library::ObjectEvent& event) {
+        if (event.object.id == 0) return;
+        told.emplace_back(event.event, event.frame);
+        if (event.cut_off) cut_off.push_back(event.frame);
+      });
+      size_t left = 0;
+      const auto take = [&] {
+        for (; separator.ready(); separator.skip(), ++left) {
+          cv::Mat picture(90, 120, CV_8UC3);
+          for (int k = 0; k < pictures; ++k)
+            separator.write(Output::background, layout_of(picture), picture.data);
+        }
+      };
+      for (int t = 0; t < 240; ++t) {
+        const cv::Mat frame = square(t);
+        separator.push(frame.data, layout_of(frame));
+        take();
+      }
+      separator.drain();
+      take();
+      EXPECT_EQ(left, 240u);
+      ASSERT_EQ(told.size(), 2u) << batch << pictures;
+      EXPECT_EQ(told[0].first, Event::appeared);
+      EXPECT_NEAR(static_cast<double>(told[0].second), 126, 8);
+      EXPECT_EQ(told[1].first, Event::stopped);
+      EXPECT_NEAR(static_cast<double>(told[1].second), 200, 8);
+      ASSERT_EQ(separator.objects().size(), 1u);
+      EXPECT_TRUE(cut_off.empty());
+      // Each of these ends what is there, once.
+      const cv::Mat small(45, 60, CV_8UC3, cv::Scalar::all(90));
+      if (pictures == 0) separator.end();
+      if (pictures == 1) separator.reset();
+      if (pictures == 3) separator.push(small.data, layout_of(small));
+      EXPECT_EQ(cut_off, (std::vector<uint64_t>{240})) << batch << pictures;
+      EXPECT_TRUE(separator.objects().empty());
+      separator.end();
+      EXPECT_EQ(cut_off.size(), 1u);
+    }
+}
+
 // Nothing that was refused is seen in a background, and nothing is forgotten.
 TEST(Library, ARefusedFrameLeavesTheBackground) {
   Options small;

@@ -166,6 +166,7 @@ class Rig {
 
   GstElement* element() const { return element_; }
   GstBus* bus() const { return bus_; }
+  GstPad* feed() const { return feed_; }
   void set_state(GstState state) {
     EXPECT_NE(GST_STATE_CHANGE_FAILURE, gst_element_set_state(element_, state));
   }

@@ -43,6 +43,21 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   EXPECT_EQ(5000000000u, memory);
   EXPECT_EQ(7u, threads);
 
+  g_object_set(element, "object-messages", TRUE, "object-snapshots", TRUE, "object-min-size", 0.125,
+               "object-appear-time", 0.5, "object-stop-time", 10.0, "object-gone-time", 2.5,
+               "motion-end-time", 7.0, nullptr);
+  gboolean messages, snapshots;
+  gdouble size, appear, stop, gone, end;
+  g_object_get(element, "object-messages", &messages, "object-snapshots", &snapshots,
+               "object-min-size", &size, "object-appear-time", &appear, "object-stop-time", &stop,
+               "object-gone-time", &gone, "motion-end-time", &end, nullptr);
+  EXPECT_TRUE(messages && snapshots);
+  EXPECT_EQ(0.125, size);
+  EXPECT_EQ(0.5, appear);
+  EXPECT_EQ(10, stop);
+  EXPECT_EQ(2.5, gone);
+  EXPECT_EQ(7, end);
+
   guint count = 0;
   GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element), &count);
   for (guint i = 0; i < count; ++i) {

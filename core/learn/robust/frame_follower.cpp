@@ -40,6 +40,7 @@ void FrameFollower::forget() {
   looks_.forget();
   memory_.forget();
   absorbed_.forget();
+  uncovered_.forget();
   scene_.forget();
   exposure_.forget();
   other_scene_ = scene_begins_ = colours_begin_ = false;

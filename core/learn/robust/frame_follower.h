@@ -50,6 +50,7 @@ class FrameFollower {
   // As those of a Learner.
   void mend(const Learner::Compared& frame, BackgroundModel* model);
   void look_ahead(const Learner::Compared& frame, BackgroundModel* model);
+  UncoveredPlaces* uncovered() { return &uncovered_; }
   void set_absorb_frames(int64_t frames) { absorb_frames_ = frames; }
   SceneSeen scene_of(int slot);
   void begin_scene();
@@ -87,6 +88,7 @@ class FrameFollower {
   Cells background() const { return {background_cells_, published_}; }
   Cells unclipped_cells(int slot, const Gain& light);
   bool is_calm() const;
+  void note_uncovered(const std::vector<int>& cells, const StandingLooks& looks, int64_t number);
   SceneSeen colours_of(const Cells& frame);
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
                        const BackgroundModel* of_window);
@@ -108,6 +110,7 @@ class FrameFollower {
   SceneMemory memory_;   // what frames that came showed
   StandingLooks looks_;  // what frames showed when they were compared, in batch
   HistoryStarts absorbed_;
+  UncoveredPlaces uncovered_;
   int64_t absorb_frames_ = 0;
   SceneWatch scene_;
   ExposureWatch exposure_;

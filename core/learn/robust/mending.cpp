@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/learn/robust/frame_follower.h"
+#include "core/learn/robust/learning_steps.h"
 #include "core/passes/median_block.h"
 #include "core/passes/read_samples.h"
 
@@ -46,12 +47,42 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
     return contours_of(context_.grid, region, pictures);
   });
   if (memory_.any_news()) calm_ = 0;
+  note_uncovered(left, memory_.looks(), frame.number);
   if (!frame.mends) return;
   // What had stood for so long was background, and frames that wait still show it.
   if (!frame.live && absorb_frames_ > 0)
     std::erase_if(left,
                   [&](int cell) { return memory_.looks().before_stood(cell) >= absorb_frames_; });
   mend_uncovered(std::move(left), memory_.looks(), frame, light, nullptr, model);
+}
+
+// For those who want to be told of it: nothing here depends on it.
+void FrameFollower::note_uncovered(const std::vector<int>& cells, const StandingLooks& looks,
+                                   int64_t number) {
+  if (cells.empty()) return;
+  const Grid& grid = context_.grid;
+  std::vector<uint8_t> marks(grid.cells());
+  for (int cell : cells) marks[static_cast<size_t>(cell)] = 1;
+  CellRegions regions(grid);
+  for (const std::vector<int>& region : regions.find(marks)) {
+    int top = grid.rows, left = grid.cols, bottom = 0, right = 0;
+    std::vector<int64_t> since, stood;
+    for (int cell : region) {
+      top = std::min(top, cell / grid.cols), bottom = std::max(bottom, cell / grid.cols + 1);
+      left = std::min(left, cell % grid.cols), right = std::max(right, cell % grid.cols + 1);
+      since.push_back(looks.since(cell));
+      stood.push_back(looks.before_stood(cell));
+    }
+    const auto middle = [](std::vector<int64_t>* of) {
+      const auto at = of->begin() + std::ssize(*of) / 2;
+      std::nth_element(of->begin(), at, of->end());
+      return *at;
+    };
+    const int x = grid.left(left), y = grid.top(top);
+    uncovered_.add(
+        {x, y, grid.left(right) - x, grid.top(bottom) - y, middle(&since), middle(&stood), number},
+        2 * steps::proofs::kMoves);
+  }
 }
 
 // of_window: the model whose window the frames are of, which knows their light; null: they came

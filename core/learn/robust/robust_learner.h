@@ -56,6 +56,7 @@ class RobustLearner : public Learner {
   void look_ahead(const Compared& frame, BackgroundModel* model) override {
     follower_.look_ahead(frame, model);
   }
+  UncoveredPlaces* uncovered() override { return follower_.uncovered(); }
   void set_absorb_frames(int64_t frames) override { follower_.set_absorb_frames(frames); }
 
   SceneSeen scene_of(int slot) override { return follower_.scene_of(slot); }

@@ -43,7 +43,7 @@ class Traffic : public Actor {
       const Sprite& lorry = lorries_[static_cast<size_t>(stream.index(kLorries))];
       const double x = begin + stream.uniform() * (slot_ - lorry.width());
       if (x < -margin_ - lorry.width() || x > frame_width_ + margin_) continue;
-      placements->push_back({&lorry, static_cast<int>(std::floor(x)), top_});
+      placements->push_back({&lorry, static_cast<int>(std::floor(x)), top_, false, i});
     }
   }
 
