@@ -158,7 +158,7 @@ void WindowSolve::unclip(const float* shown, const GridFrames& median, const Gai
 // Where all that show it are such, darker ones that may show the same say it; else the darkest do.
 // chosen: the looks in unit light.
 void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) {
-  using steps::light::kNearEnd;
+  using steps::light::kAtEnd, steps::light::kNearEnd;
   const size_t cells = context_.grid.cells();
   std::vector<std::pair<float, uint16_t>> shown, darker;
   std::vector<uint8_t> keeps(looks.pictures.size());
@@ -199,7 +199,7 @@ void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) 
       shown.emplace_back(brightest(frame, cell), frame);
     std::sort(shown.begin(), shown.end());
     std::fill(keeps.begin(), keeps.end(), uint8_t{0});
-    if (shown.empty() || shown.back().first < kNearEnd) continue;
+    if (shown.empty() || shown.back().first < kAtEnd) continue;
     if (shown.front().first >= kNearEnd) {
       darker.clear();
       for (size_t frame = 0; frame < keeps.size(); ++frame)
