@@ -156,8 +156,6 @@ QDMD_STEP size_t kLeastNews = step("looks.least_news", size_t{18});
 
 // ---- Proofs: what stands there came, or was uncovered ----
 namespace proofs {
-// Frames from one judgement of what nobody has judged yet to the next: contours take time.
-QDMD_STEP int64_t kEvery = step("proofs.every", int64_t{2});
 // Frames before and after a change in which things arrive or go away.
 QDMD_STEP int64_t kMoves = step("proofs.moves", int64_t{20});
 // Frames: something else may hide a piece of what left for so long.

@@ -250,15 +250,13 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
     if (since_[cell] < looks_.since(at)) of_[cell] = Of::none;
     unjudged_[cell] = of_[cell] == Of::none;
   }
-  if (looks_.newest() % kEvery == 0) {
-    CellRegions regions(grid_);
-    for (const std::vector<int>& region : regions.find(unjudged_)) {
-      judge(region, contours);
-      if (of_[static_cast<size_t>(region[0])] == Of::left)
-        found_.insert(found_.end(), region.begin(), region.end());
-    }
-    if (!found_.empty()) widen(background);
+  CellRegions regions(grid_);
+  for (const std::vector<int>& region : regions.find(unjudged_)) {
+    judge(region, contours);
+    if (of_[static_cast<size_t>(region[0])] == Of::left)
+      found_.insert(found_.end(), region.begin(), region.end());
   }
+  if (!found_.empty()) widen(background);
   // What passes before a cell may have hidden what is behind.
   for (int at : differing_)
     if (!unjudged_[static_cast<size_t>(at)] && of_[static_cast<size_t>(at)] == Of::left)
