@@ -32,21 +32,24 @@ float brightest(const float* const planes[3], size_t cell) {
 // range says too little of.
 float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
                 const Gain& gain) {
-  size_t agree = 0, seen = 0;
+  int agree = 0, seen = 0;
+  // Without branches: the compiler makes vectors of it.
   for (size_t cell = 0; cell < cells; ++cell) {
-    float difference = 0;
-    size_t at_end = 0;
+    float difference = 0, known = 0;
     for (size_t c = 0; c < kChannels; ++c) {
-      const bool says = frame[c][cell] < kAtEnd && reference[c][cell] < kAtEnd;
-      at_end += !says;
-      if (says) difference += std::abs(frame[c][cell] / gain[c] - reference[c][cell]);
+      const float f = frame[c][cell], r = reference[c][cell];
+      const float says = std::max(f, r) < kAtEnd ? 1.0f : 0.0f;
+      difference += says * std::abs(f / gain[c] - r);
+      known += says;
     }
-    if (at_end == kChannels) continue;
-    ++seen;
-    if (difference < 3 * kAgree) ++agree;
+    const int any = known > 0 ? 1 : 0;
+    seen += any;
+    agree += any & (difference < 3 * kAgree ? 1 : 0);
   }
   // Where all is white, nothing is known.
-  return seen < kLeastRatios ? 1 : static_cast<float>(agree) / static_cast<float>(seen);
+  return seen < static_cast<int>(kLeastRatios)
+             ? 1
+             : static_cast<float>(agree) / static_cast<float>(seen);
 }
 
 // The share of cells with samples at the end of their range.
