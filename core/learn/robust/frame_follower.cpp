@@ -123,10 +123,11 @@ SceneSeen FrameFollower::colours_of(const Cells& frame) {
   other_coloured_ = other ? other_coloured_ + 1 : 0;
   if (other_coloured_ < steps::colour::kFrames) return SceneSeen::same;
   const bool returns = left_colours_ == now;
-  // Nobody knows which colours a grey scene has.
+  // Somebody in colours may come before a grey wall.
+  if (!returns && now != Colouring::none) return SceneSeen::same;
   new_colours_.reset();
   if (now == Colouring::none) new_colours_ = find_colour_map(frame, background, cells);
-  if (!returns && now == Colouring::none && !new_colours_) return SceneSeen::same;
+  if (!returns && !new_colours_) return SceneSeen::same;
   other_coloured_ = 0;
   colours_begin_ = true;
   left_colours_ = known;

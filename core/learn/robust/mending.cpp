@@ -36,8 +36,9 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
   if (!context_.follows(context_.room.models)) return;
   const int slot = frame.around.slot(frame.at);
   const Gain light = !model ? kSameLight : frame.live ? model->light(frame.t) : this->light(slot);
-  exposure_.follow(Cells(context_.room.frames->cells(), slot), context_.grid.cells());
-  if (!exposure_.settled()) memory_.forget();
+  // What a camera showed while it looked for its exposure is no proof of anything.
+  if (exposure_.follow(Cells(context_.room.frames->cells(), slot), context_.grid.cells()))
+    memory_.forget();
   memory_.follow(unclipped_cells(slot, light), light, frame.number);
   if (!model) return;
   const Cells background = this->background();
