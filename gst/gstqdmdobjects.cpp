@@ -20,28 +20,6 @@ gint64 step_of(const GstVideoInfo& info) {
   return n > 0 && d > 0 ? gint64(gst_util_uint64_scale(GST_SECOND, d, n)) : kAssumedStep;
 }
 
-const char* name_of(ObjectEvent::Kind kind) {
-  using Kind = ObjectEvent::Kind;
-  switch (kind) {
-    case Kind::appeared:
-      return "appeared";
-    case Kind::stopped:
-      return "stopped";
-    case Kind::left_behind:
-      return "left-behind";
-    case Kind::removed:
-      return "removed";
-    case Kind::moved_on:
-      return "moved-on";
-    case Kind::gone:
-      return "gone";
-    case Kind::motion_begins:
-      return "motion-begins";
-    default:
-      return "motion-ends";
-  }
-}
-
 bool is_of_picture(const ObjectEvent& event) {
   return event.kind == ObjectEvent::Kind::motion_begins ||
          event.kind == ObjectEvent::Kind::motion_ends;

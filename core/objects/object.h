@@ -74,6 +74,29 @@ struct ObjectEvent {
   bool cut_off = false;  // gone, motion_ends: the stream ended before
 };
 
+// The name that users see.
+inline const char* name_of(ObjectEvent::Kind kind) {
+  using Kind = ObjectEvent::Kind;
+  switch (kind) {
+    case Kind::appeared:
+      return "appeared";
+    case Kind::stopped:
+      return "stopped";
+    case Kind::left_behind:
+      return "left-behind";
+    case Kind::removed:
+      return "removed";
+    case Kind::moved_on:
+      return "moved-on";
+    case Kind::gone:
+      return "gone";
+    case Kind::motion_begins:
+      return "motion-begins";
+    default:
+      return "motion-ends";
+  }
+}
+
 struct ObjectOptions {
   // The longer side of an object's box, in parts of the picture's height.
   double min_size = 1.0 / 60;

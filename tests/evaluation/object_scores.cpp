@@ -103,28 +103,6 @@ void EventScores::add(const EventScores& other) {
   delays.insert(delays.end(), other.delays.begin(), other.delays.end());
 }
 
-const char* name_of(ObjectEvent::Kind kind) {
-  using Kind = ObjectEvent::Kind;
-  switch (kind) {
-    case Kind::appeared:
-      return "appeared";
-    case Kind::stopped:
-      return "stopped";
-    case Kind::left_behind:
-      return "left-behind";
-    case Kind::removed:
-      return "removed";
-    case Kind::moved_on:
-      return "moved-on";
-    case Kind::gone:
-      return "gone";
-    case Kind::motion_begins:
-      return "motion-begins";
-    default:
-      return "motion-ends";
-  }
-}
-
 EventScores score_events(const std::vector<TimedEvent>& truth, const std::vector<TimedEvent>& told,
                          ObjectEvent::Kind kind, int last, const char* verbose) {
   EventScores scores;

@@ -58,6 +58,4 @@ inline constexpr int kEarly = 10, kLate = 10, kMuchLate = 75;
 EventScores score_events(const std::vector<TimedEvent>& truth, const std::vector<TimedEvent>& told,
                          ObjectEvent::Kind kind, int last, const char* verbose);
 
-const char* name_of(ObjectEvent::Kind kind);
-
 }  // namespace qdmd::evaluation
