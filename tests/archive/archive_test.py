@@ -176,7 +176,7 @@ def element_of_window(clip, first, count, method, output, into=''):
         source.push_buffer(buffer)
     source.end_of_stream()
     frames = [bytes_of(sample) for sample in samples_of(end)]
-    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ELEMENT).get_structure()
+    message = common.element_message(pipeline, 'qdmdbackground', timeout=0)
     pipeline.set_state(Gst.State.NULL)
     return frames, message
 

@@ -25,6 +25,17 @@ def play(description):
     return pipeline
 
 
+def element_message(pipeline, name, timeout=60 * Gst.SECOND):
+    """The structure of the next element message of this name; others before it are dropped.
+    None: no such message came in `timeout` ns."""
+    end = GLib.get_monotonic_time() * 1000 + timeout
+    while message := pipeline.get_bus().timed_pop_filtered(
+            max(0, end - GLib.get_monotonic_time() * 1000), Gst.MessageType.ELEMENT):
+        if message.get_structure().get_name() == name:
+            return message.get_structure()
+    return None
+
+
 def make_film(path):
     """A film of a simulated street, 320x240 at 25 frames/s, with sound."""
     samples = FILM_FRAMES * 44100 // 25

@@ -196,11 +196,8 @@ def messages_as_documented(folder):
              'gboolean': 'boolean', 'GstQdmdBackgroundSolver': 'enum', 'GstQdmdBackgroundEstimator': 'enum'}
     try:
         for _ in range(3):
-            message = pipeline.get_bus().timed_pop_filtered(60 * common.Gst.SECOND,
-                                                            common.Gst.MessageType.ELEMENT)
-            assert message, 'no message came'
-            fields = message.get_structure()
-            assert fields.get_name() == 'qdmdbackground', fields.to_string()
+            fields = common.element_message(pipeline, 'qdmdbackground')
+            assert fields, 'no message came'
             posted = {}
             for number in range(fields.n_fields()):
                 name = fields.nth_field_name(number)
