@@ -82,9 +82,7 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
       see(gray(frame, cell), gray(reference, cell), cell, kBright);
       continue;
     }
-    // One of them: there is room for as many ratios as cells.
-    const size_t c = cell % kChannels;
-    see(frame[c][cell], reference[c][cell], cell, kMeasured);
+    for (size_t c = 0; c < kChannels; ++c) see(frame[c][cell], reference[c][cell], cell, kMeasured);
   }
   if (ratios.size() < kLeastRatios) return kSameLight;
   int best = 0, most = -1;

@@ -37,11 +37,11 @@ class LightScratch {
  public:
   LightScratch() = default;
   explicit LightScratch(size_t cells) {
-    ratios.reserve(cells);
-    near.reserve(cells);
+    ratios.reserve(kChannels * cells);
+    near.reserve(kChannels * cells);
   }
   static uint64_t bytes(uint64_t cells) {
-    return cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
+    return kChannels * cells * (sizeof(std::pair<float, size_t>) + sizeof(float));
   }
 
   std::vector<std::pair<float, size_t>> ratios;
