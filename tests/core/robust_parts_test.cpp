@@ -504,6 +504,36 @@ TEST(StableFramesOf, LooksThatSayNothingAreNeverChosen) {
   }
 }
 
+// However strange what was known before is: a cell without frames would have no background.
+TEST(StableFramesOfTheWorst, HaveAFrameForEachCell) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> level(0, 255), chance(0, 1);
+  Pool pool(2);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Grid grid = grid_of(6, 9);
+    const size_t cells = grid.cells();
+    GridFrames frames(grid, 21);
+    // Half of the cells show the same in all frames, others never.
+    for (size_t cell = 0; cell < cells; ++cell) {
+      const bool same = chance(random) < 0.5f;
+      for (int c = 0; c < 3; ++c) {
+        const float shown = level(random);
+        for (int t = 0; t < 21; ++t) frames.plane(t, c)[cell] = same ? shown : level(random);
+      }
+    }
+    Recollection earlier = {std::vector<float>(cells, 50), std::vector<float>(cells, 0), {}};
+    FirstLooks looks(cells);
+    for (size_t cell = 0; cell < cells; ++cell) {
+      looks.from[cell] = static_cast<uint16_t>(25 * chance(random));
+      looks.earlier_counts[cell] = chance(random) < 0.5f;
+    }
+    const StableFrames stable =
+        find_stable_frames(grid, frames, 20, &earlier, &pool, trial % 2 ? looks : FirstLooks());
+    for (size_t cell = 0; cell < cells; ++cell)
+      ASSERT_FALSE(stable.of_cell[cell].empty()) << "trial " << trial << ", cell " << cell;
+  }
+}
+
 // ---- What earlier windows showed ----
 
 // The last picture of `scene` is what an earlier window left, seen in `weight` frames.

@@ -237,6 +237,8 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
         result.of_cell.take(cell, [&](size_t t) {
           return of_cell[t] <= limit && counts(cell, static_cast<int>(t));
         });
+      // Beside other frames' looks none may be near enough: what was chosen shows it all the same.
+      if (result.of_cell[cell].empty()) result.of_cell.add(cell, from[cell]);
     }
   });
   return result;
