@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "core/base/channels.h"
+
 namespace qdmd {
 
 // Black and white of each channel. Chroma has one value for both, which is neutral: what is drawn
@@ -14,6 +16,18 @@ struct Levels {
     for (int c = 0; c < 3; ++c)
       if (black[c] != 0 || white[c] != 255) return false;
     return true;
+  }
+  // Chroma has as many steps on both sides of what has no colour.
+  SampleRange range() const {
+    SampleRange found;
+    const bool all = white[0] - black[0] == 255;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const bool chroma = white[c] == black[c];
+      found.dark[c] = black[c];
+      found.least[c] = all ? 0 : chroma ? static_cast<uint8_t>(black[c] - 112) : black[c];
+      found.most[c] = all ? 255 : chroma ? static_cast<uint8_t>(black[c] + 112) : white[c];
+    }
+    return found;
   }
 };
 

@@ -21,9 +21,13 @@ bool is_finite(const DmdSummary& summary) {
 Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room, Colours colours,
                        const DecisionSteps& steps, const Levels& levels)
     : room_(room),
+      colours_(colours),
       learner_(std::move(learner)),
       decision_(room.frames->width(), room.frames->band(), colours, steps, levels) {
-  for (BackgroundModel& model : models_) model.set_depth(room_.frames->depth());
+  for (BackgroundModel& model : models_) {
+    model.set_depth(room_.frames->depth());
+    model.set_samples({colours, levels}, levels.range());
+  }
   learner_->begin(room_);
 }
 
@@ -94,7 +98,7 @@ void Background::finish(const Wishes& wishes) {
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
   next_report_.foreground =
       foreground_statistics(*snapshots_, models_[next()], wishes.foreground_threshold, *room_.pool,
-                            wishes.ignored, room_.frames->width(), room_.frames->band());
+                            wishes.ignored, room_.frames->width(), room_.frames->band(), colours_);
   // Nobody decides before there is a first model.
   if (wishes.masks_expected && room_.models != Models::two_of_live && !known_ &&
       decision_.new_born())
@@ -187,7 +191,8 @@ void Background::set_wishes(const Wishes& wishes) {
   learner_->set_absorb_frames(wishes.absorb_frames);
   ForegroundStatistics& foreground = report_.foreground;
   const double threshold = wishes.foreground_threshold;
-  foreground.threshold = threshold > 0 ? threshold : automatic_threshold(foreground.noise);
+  foreground.threshold =
+      threshold > 0 ? threshold : automatic_threshold(foreground.noise, colours_);
 }
 
 }  // namespace qdmd

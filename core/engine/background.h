@@ -103,6 +103,7 @@ class Background {
   int next() const { return room_.models == Models::one ? newest_ : 1 - newest_; }
 
   LearnerRoom room_;
+  Colours colours_;
   std::unique_ptr<Learner> learner_;
   Decision decision_;
   // If there are two, one is in use while the next is built.

@@ -23,7 +23,6 @@ struct EngineOptions : LearnOptions, PictureWishes {
   Mode mode = Mode::batch;
   int window_size = 100;                    // m, kMinWindow .. kMaxWindow frames
   int hop_size = 0;                         // frames between solves in live mode, up to m; 0: m / 4
-  Levels levels;                            // of the frames
   DecisionSteps steps;                      // of masks
   Stabilize stabilize = Stabilize::off;     // how the camera may move
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take

@@ -113,6 +113,15 @@ struct Decision::Lit {
 
 namespace {
 
+// The constants that are levels of R, G and B.
+DecisionSteps in_levels_of(Colours colours, DecisionSteps steps) {
+  const double level = level_of(colours);
+  steps.constants.noisy *= level;
+  steps.constants.least_of_means *= level;
+  steps.constants.light.least_rest *= static_cast<float>(level);
+  return steps;
+}
+
 int search_step(int width, int height) { return std::max(1, std::min(width, height) / 240); }
 
 // Pixels of a member's own rows, packed, of any member: bytes.
@@ -136,7 +145,7 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
                    const Levels& levels)
     : band_(band),
       shape_(width, band, steps.vote),
-      steps_(steps),
+      steps_(in_levels_of(colours, steps)),
       colours_(colours),
       grey_(colours == Colours::grey),
       texture_(width, band, steps.constants),
@@ -155,6 +164,7 @@ Decision::Decision(int width, const Band& band, Colours colours, const DecisionS
     packed_.resize(bytes);
   }
   std::copy_n(levels.black, kChannels, black_);
+  rgb_ = RgbColours(colours, levels);
 }
 
 uint64_t Decision::bytes(int width, const Band& band) {
@@ -341,14 +351,9 @@ void Decision::look() {
 // brighter in less light agrees.
 void Decision::raise_ends(size_t first, size_t count, uint8_t* const level[3]) const {
   constexpr float kEnd = 253;
-  for (size_t c = 0; c < kChannels; ++c) {
-    const float least = kEnd * now_.frame.model->shown_light()[c];
-    if (least >= kEnd) continue;
-    const auto end = static_cast<uint8_t>(std::ceil(std::max(least, 1.0f)));
-    const uint8_t* const x = now_.frame.x[c].high + first;
-    for (size_t i = 0; i < count; ++i)
-      level[c][i] = level[c][i] >= end && x[i] > level[c][i] ? x[i] : level[c][i];
-  }
+  const uint8_t* const x[3] = {now_.frame.x[0].high + first, now_.frame.x[1].high + first,
+                               now_.frame.x[2].high + first};
+  rgb_.raise_ends(count, kEnd, now_.frame.model->shown_light(), x, level);
 }
 
 // L, and which pixels differ from it.
@@ -534,7 +539,7 @@ void Decision::look_at(Run* run) {
   if (now_.means)
     for (size_t p = 0; p < count; ++p) run->limit[p] /= 3;
   if (now_.light > 1)
-    for (size_t p = 0; p < count; ++p) run->limit[p] = in_light(run->limit[p], now_.light);
+    for (size_t p = 0; p < count; ++p) run->limit[p] = in_light(run->limit[p], {now_.light});
   for (size_t p = 0; p < count; ++p) run->limit[p] = std::max(run->limit[p], least);
 }
 

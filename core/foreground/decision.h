@@ -19,6 +19,7 @@
 #include "core/model/background_model.h"
 #include "core/parallel/pool.h"
 #include "core/passes/read_samples.h"
+#include "core/passes/rgb_colours.h"
 
 namespace qdmd {
 
@@ -167,6 +168,7 @@ class Decision {
   DecisionSteps steps_;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
   uint8_t black_[3];
+  RgbColours rgb_;
   Colours colours_;
   bool grey_ = false;  // the newest frame is
   MovingTexture texture_;

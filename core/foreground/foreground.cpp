@@ -24,12 +24,14 @@ constexpr size_t kBins = kResidualBeyond, kCounts = 2 * kBins;
 
 }  // namespace
 
-double automatic_threshold(double noise) { return std::max(4 * std::sqrt(3.0) * noise, 18.0); }
+double automatic_threshold(double noise, Colours colours) {
+  return std::max(4 * std::sqrt(3.0) * noise, 18 * level_of(colours));
+}
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, Pool& pool,
-                                           const IgnoredAreas& ignored, int width,
-                                           const Band& band) {
+                                           const IgnoredAreas& ignored, int width, const Band& band,
+                                           Colours colours) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = kResidualSteps;
@@ -98,7 +100,7 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
     below += histogram[quartile++];
   statistics.noise = static_cast<double>(quartile) / kBinsPerLevel / 1.1012;
   statistics.threshold =
-      fixed_threshold > 0 ? fixed_threshold : automatic_threshold(statistics.noise);
+      fixed_threshold > 0 ? fixed_threshold : automatic_threshold(statistics.noise, colours);
   int64_t above = 0;
   for (size_t bin = 0; bin < histogram.size(); ++bin)
     if (static_cast<double>(bin) / kBinsPerLevel > statistics.threshold)

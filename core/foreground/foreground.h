@@ -1,6 +1,7 @@
 // Foreground statistics of a solved window.
 #pragma once
 
+#include "core/base/colours.h"
 #include "core/base/ignored_areas.h"
 #include "core/model/background_model.h"
 #include "core/parallel/band.h"
@@ -15,7 +16,7 @@ struct ForegroundStatistics {
 };
 
 // The threshold that suits a noise level: max(4 sqrt(3) sigma, 18) grey levels of quaternion norm.
-double automatic_threshold(double noise);
+double automatic_threshold(double noise, Colours colours = Colours::rgb);
 
 // Looks at a sample of the window's residuals |x_t - L(t)| (quaternion norm). The noise comes from
 // their lower quartile, which a foreground of up to three quarters of the pixels cannot move much:
@@ -26,6 +27,6 @@ double automatic_threshold(double noise);
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, Pool& pool,
                                            const IgnoredAreas& ignored = {}, int width = 1,
-                                           const Band& band = {});
+                                           const Band& band = {}, Colours colours = Colours::rgb);
 
 }  // namespace qdmd

@@ -55,6 +55,7 @@ FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameCon
       height_(band.rows()),
       sample_step_(contents.sample_step),
       most_bytes_(most_bytes),
+      rgb_(contents.rgb),
       planes_(capacity, shape_of(width, height_, contents), contents.depth),
       spread_(spread_size(width, contents)),
       constant_alpha_(static_cast<size_t>(sample_bytes(contents.depth) * capacity), 255),
@@ -117,6 +118,7 @@ void FrameStore::take_contents(int slot, Pool* pool) {
   }
   if (cells_.cells() == 0) return;
   find_own_cells(grid_, band_, picture, &cells_, slot, pool);
+  rgb_.convert(cells_.cells(), cells_.channels(slot).data());
   if (band_.is_whole()) return;
   to_share_[static_cast<size_t>(slot)] = 1;
   any_to_share_ = true;

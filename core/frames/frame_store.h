@@ -10,6 +10,7 @@
 #include "core/base/image_view.h"
 #include "core/parallel/band.h"
 #include "core/passes/grid.h"
+#include "core/passes/rgb_colours.h"
 #include "core/planes/snapshot_range.h"
 
 namespace qdmd {
@@ -22,6 +23,7 @@ struct FrameContents {
   // kept once. 1: whatever frames share, each pixel has its own.
   int chroma_columns = 1, chroma_rows = 1;
   int depth = 8;  // bits of the frames' samples, 8 to 16. Cells are of the highest eight
+  RgbColours rgb = {};
 };
 
 // The newest `capacity` frames of width x height pixels: planes, samples, cells, alpha. Everything
@@ -105,8 +107,10 @@ class FrameStore {
   Band band_;
   int width_ = 0, height_ = 0, sample_step_ = 1;
   uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
+  RgbColours rgb_;
   Window planes_;
   PlaneSlots samples_;
+
   Grid grid_;
   // Only those of a band are to be shared: others do not change by being looked at.
   mutable GridFrames cells_;

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/base/colours.h"
+#include "core/base/levels.h"
 #include "core/dmd/options.h"
 
 namespace qdmd {
@@ -23,6 +24,7 @@ struct LearnOptions {
   // Windows are told what earlier ones showed (Method::robust); false saves the memory for it.
   bool remembers = true;
   Colours colours = Colours::rgb;  // of the frames
+  Levels levels;                   // of the frames
   int depth = 8;                   // bits of the frames' samples, 8 to 16
   // Pixels that share a sample of channels 1 and 2 in all frames, as in ChromaShape. 1: each has
   // its own, or frames differ, which takes more memory. Others than Y, U and V are not shared.

@@ -168,8 +168,40 @@ void BackgroundModel::use_steady_weights(double t) {
   if (moved.maxCoeff() < kSteadyLevels / (1 << bits_below(depth_))) time_weights_ = steady_weights_;
 }
 
-void BackgroundModel::set_time(double t) {
+// The light of that time.
+void BackgroundModel::take_light(double t) {
   shown_light_ = light(t);
+  const SampleLight light(shown_light_, range_);
+  for (size_t c = 0; c < kChannels; ++c) offset_[c] = light.into(c).offset;
+  ends_ = rgb_.converts() && *std::max_element(shown_light_.begin(), shown_light_.end()) > 1;
+}
+
+// evaluate() where R, G and B end: samples times `scale`, and `bias` more.
+template <typename Sample>
+void BackgroundModel::evaluate_ends(size_t first, size_t count, float scale, float bias,
+                                    Sample* const out[3]) const {
+  float levels[kChannels][kMaxRun];
+  evaluate_with(
+      first,
+      [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
+        for (size_t c = 0; c < kChannels; ++c) {
+          std::fill_n(levels[c], count, offset_[c]);
+          for (size_t k = 0; k < number; ++k)
+            for (size_t p = 0; p < count; ++p)
+              levels[c][p] += weights[c * number + k] * pictures[k][at + p];
+        }
+      },
+      count);
+  float* const rows[kChannels] = {levels[0], levels[1], levels[2]};
+  rgb_.clip(count, rows);
+  const float most = 256 * scale - 1;
+  for (size_t c = 0; c < kChannels; ++c)
+    for (size_t p = 0; p < count; ++p)
+      out[c][p] = static_cast<Sample>(std::clamp(scale * levels[c][p] + bias, 0.0f, most));
+}
+
+void BackgroundModel::set_time(double t) {
+  take_light(t);
   if (frozen_) {
     std::array<float, 9> weights = kIdentity;
     if (!gains_.empty()) {
@@ -221,20 +253,23 @@ void BackgroundModel::evaluate_with(size_t first, const Evaluate& evaluate, size
 }
 
 void BackgroundModel::evaluate(size_t first, size_t count, uint8_t* const out[3]) const {
+  if (ends_) return evaluate_ends(first, count, 1, depth_ > 8 ? 0 : 0.5f, out);
   const auto levels = depth_ > 8 ? high_digits_of : levels_of;
   evaluate_with(
       first,
       [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
-        levels(weights, pictures, number, at, count, out);
+        levels(weights, pictures, number, at, count, out, offset_);
       },
       count);
 }
 
 void BackgroundModel::evaluate_deep(size_t first, size_t count, uint16_t* const out[3]) const {
+  if (ends_)
+    return evaluate_ends(first, count, static_cast<float>(1 << bits_below(depth_)), 0.5f, out);
   evaluate_with(
       first,
       [&](const float* weights, const float* const* pictures, size_t number, size_t at) {
-        deep_levels_of(weights, pictures, number, depth_, at, count, out);
+        deep_levels_of(weights, pictures, number, depth_, at, count, out, offset_);
       },
       count);
 }
@@ -257,16 +292,21 @@ void BackgroundModel::freeze_at(double t) {
   if (direct_) {
     make_pictures(3);
     combine_directly(0, pixels_, pictures_.data());
+    for (size_t c = 0; c < kChannels; ++c)
+      if (offset_[c] != 0)
+        for (size_t p = 0; p < pixels_; ++p) pictures_[c][p] += offset_[c];
   } else {
     // The pictures make room for L(t), pixel by pixel.
     const size_t pictures = picture_count();
     samples_.resize(std::max<size_t>(pictures, 3) * pixels_);
-    levels_in_place(weights_.data(), pictures, pixels_, samples_.data());
+    levels_in_place(weights_.data(), pictures, pixels_, samples_.data(), offset_);
     make_pictures(3);
   }
   direct_ = false;
   frozen_ = true;
   gains_.clear();
+  offset_ = {};
+  ends_ = false;
   weights_.assign(kIdentity.begin(), kIdentity.end());
   change();
 }
@@ -309,6 +349,8 @@ void BackgroundModel::freeze_as(const OwnedPicture& picture, const std::vector<u
   else
     limits_.clear();
   gains_.clear();
+  offset_ = {};
+  ends_ = false;
   weights_.assign(kIdentity.begin(), kIdentity.end());
   direct_ = false;
   frozen_ = true;

@@ -9,6 +9,7 @@
 #include "core/base/large_vector.h"
 #include "core/dmd/temporal_model.h"
 #include "core/passes/combine.h"
+#include "core/passes/rgb_colours.h"
 #include "core/planes/owned_picture.h"
 #include "core/planes/snapshot_range.h"
 
@@ -23,6 +24,12 @@ class BackgroundModel {
   // evaluate_deep() knows more of it. Before all other calls.
   void set_depth(int bits) { depth_ = bits; }
   int depth() const { return depth_; }
+
+  // What the samples are, and what light may make of them. Before all other calls.
+  void set_samples(const RgbColours& rgb, const SampleRange& range) {
+    rgb_ = rgb;
+    range_ = range;
+  }
 
   // All of begin() and build_slice(). `snapshots` is read here and, while the combination is
   // direct, until the next build.
@@ -50,7 +57,7 @@ class BackgroundModel {
   void make_steady() { steady_ = true; }
   static constexpr int kSteadyFrames = 10;
   static constexpr double kSteadyLevels = 0.25;
-  // One gain for each frame from the first snapshot on. L(t) is multiplied by the gain of time t,
+  // One gain for each frame from the first snapshot on. L(t) is seen in the light of time t,
   // or of the nearest time that has one. Kept until begin().
   void set_gains(const std::vector<Gain>& gains) { gains_ = gains; }
   // For set_time() from now on, in place of the snapshots' gains.
@@ -133,6 +140,10 @@ class BackgroundModel {
   void make_pictures(size_t count);
   void group(const Eigen::MatrixXd& rows);
   void take_weights(const float* weights, size_t count);
+  void take_light(double t);
+  template <typename Sample>
+  void evaluate_ends(size_t first, size_t count, float scale, float bias,
+                     Sample* const out[3]) const;
   void use_steady_weights(double t);
   // L is another picture from now on.
   void change();
@@ -156,6 +167,11 @@ class BackgroundModel {
   std::vector<float*> pictures_;
   std::vector<float> weights_;  // 3 x K over pictures
   std::vector<Gain> gains_;     // of the snapshots; none: the same light
+  RgbColours rgb_;
+  SampleRange range_;
+  Offset offset_ = {};  // what light adds
+  // In more light R, G and B end, but not the samples that are made of them.
+  bool ends_ = false;
   std::vector<uint8_t> limits_;
 };
 

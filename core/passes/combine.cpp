@@ -55,9 +55,11 @@ struct Sums {
   }
 };
 
-// How sums become samples: times `scale`, plus `bias` (a half: rounded to nearest), at most `top`.
+// How sums, to which `offset` of their channel is added, become samples: times `scale`, plus `bias`
+// (a half: rounded to nearest), at most `top`.
 struct Rounding {
   float scale, bias, top;
+  const Offset& offset;
 };
 
 template <class D, typename T>
@@ -72,6 +74,11 @@ size_t level_vectors(const float* weights, const float* const* pictures, size_t 
   const float* blue = weights + 2 * picture_count;
   // Adding a half and truncating rounds to nearest in the range that survives the clamp.
   const auto bias = hn::Set(d, rounding.bias), zero = hn::Zero(d), top = hn::Set(d, rounding.top);
+  // With bytes the bias comes first: it is one step less.
+  const float before = sizeof(T) > 1 ? 0 : rounding.bias;
+  const auto first_red = hn::Set(d, before + rounding.offset[0]),
+             first_green = hn::Set(d, before + rounding.offset[1]),
+             first_blue = hn::Set(d, before + rounding.offset[2]);
   const auto scale = hn::Set(d, rounding.scale);
   const auto store = [&](hn::Vec<D> sum, T* to) HWY_ATTR {
     if constexpr (sizeof(T) > 1) sum = hn::MulAdd(scale, sum, bias);
@@ -80,10 +87,9 @@ size_t level_vectors(const float* weights, const float* const* pictures, size_t 
     const auto whole = hn::ConvertTo(d32, hn::Min(positive, top));
     hn::StoreU(hn::DemoteTo(d_samples, whole), d_samples, to);
   };
-  (void)scale;
+  (void)scale, (void)bias;
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
-    // With bytes the bias comes first: it is one step less.
-    auto r = sizeof(T) > 1 ? zero : bias, g = r, b = r;
+    auto r = first_red, g = first_green, b = first_blue;
     for (size_t k = 0; k < picture_count; ++k) {
       const float* from = pictures[k] + first + p;
       // The next run's: other frames' work has driven it out of the cache, and the hardware
@@ -145,10 +151,10 @@ void combine_four_deep(const double* coefficients, const uint16_t* const* planes
 // Products and sums are rounded one by one, whatever the vectors can do.
 template <class D>
 size_t level_in_place(const float* weights, size_t picture_count, size_t stride, size_t p,
-                      size_t count, float* samples) {
+                      size_t count, float* samples, const Offset& offset) {
   const D d;
   for (; p + hn::Lanes(d) <= count; p += hn::Lanes(d)) {
-    auto r = hn::Zero(d), g = r, b = r;
+    auto r = hn::Set(d, offset[0]), g = hn::Set(d, offset[1]), b = hn::Set(d, offset[2]);
     for (size_t k = 0; k < picture_count; ++k) {
       const auto level = hn::LoadU(d, samples + k * stride + p);
       r = hn::Add(r, hn::Mul(hn::Set(d, weights[k]), level));
@@ -173,20 +179,23 @@ HWY_INLINE void all_levels(const float* weights, const float* const* pictures, s
                                          count, out);
 }
 
-void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples) {
-  const size_t p =
-      level_in_place<hn::ScalableTag<float>>(weights, picture_count, count, 0, count, samples);
-  level_in_place<hn::CappedTag<float, 1>>(weights, picture_count, count, p, count, samples);
+void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples,
+                     const Offset& offset) {
+  const size_t p = level_in_place<hn::ScalableTag<float>>(weights, picture_count, count, 0, count,
+                                                          samples, offset);
+  level_in_place<hn::CappedTag<float, 1>>(weights, picture_count, count, p, count, samples, offset);
 }
 
 void levels(const float* weights, const float* const* pictures, size_t picture_count, float bias,
-            size_t first, size_t count, uint8_t* const* out) {
-  all_levels(weights, pictures, picture_count, {1, bias, 255}, first, count, out);
+            const Offset& offset, size_t first, size_t count, uint8_t* const* out) {
+  all_levels(weights, pictures, picture_count, {1, bias, 255, offset}, first, count, out);
 }
 void deep_levels(const float* weights, const float* const* pictures, size_t picture_count,
-                 int depth, size_t first, size_t count, uint16_t* const* out) {
+                 int depth, const Offset& offset, size_t first, size_t count,
+                 uint16_t* const* out) {
   const auto scale = static_cast<float>(1 << (depth - 8));
-  all_levels(weights, pictures, picture_count, {scale, 0.5f, 256 * scale - 1}, first, count, out);
+  all_levels(weights, pictures, picture_count, {scale, 0.5f, 256 * scale - 1, offset}, first, count,
+             out);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -220,23 +229,25 @@ void combine_planes(const double* coefficients, size_t sum_count, const uint16_t
 }
 
 void levels_of(const float* weights, const float* const* pictures, size_t picture_count,
-               size_t first, size_t count, uint8_t* const out[3]) {
-  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0.5f, first, count, out);
+               size_t first, size_t count, uint8_t* const out[3], const Offset& offset) {
+  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0.5f, offset, first, count, out);
 }
 
 void high_digits_of(const float* weights, const float* const* pictures, size_t picture_count,
-                    size_t first, size_t count, uint8_t* const out[3]) {
-  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0, first, count, out);
+                    size_t first, size_t count, uint8_t* const out[3], const Offset& offset) {
+  HWY_DYNAMIC_DISPATCH(levels)(weights, pictures, picture_count, 0, offset, first, count, out);
 }
 
 void deep_levels_of(const float* weights, const float* const* pictures, size_t picture_count,
-                    int depth, size_t first, size_t count, uint16_t* const out[3]) {
+                    int depth, size_t first, size_t count, uint16_t* const out[3],
+                    const Offset& offset) {
   HWY_DYNAMIC_DISPATCH(deep_levels)
-  (weights, pictures, picture_count, depth, first, count, out);
+  (weights, pictures, picture_count, depth, offset, first, count, out);
 }
 
-void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples) {
-  HWY_DYNAMIC_DISPATCH(levels_in_place)(weights, picture_count, count, samples);
+void levels_in_place(const float* weights, size_t picture_count, size_t count, float* samples,
+                     const Offset& offset) {
+  HWY_DYNAMIC_DISPATCH(levels_in_place)(weights, picture_count, count, samples, offset);
 }
 
 }  // namespace qdmd

@@ -38,32 +38,36 @@ void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
 // `from` in unit light where kept, else 0. next: what the next call reads; planes are too many
 // streams for the hardware to foresee.
 void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep, size_t count,
-              float factor, const uint8_t* next, uint8_t* HWY_RESTRICT out) {
+              const LevelMap& map, const uint8_t* next, uint8_t* HWY_RESTRICT out) {
   for (size_t i = 0; i < count; i += 64) hwy::Prefetch(next + i);
-  if (factor == 1) {
+  if (map.factor == 1) {
     for (size_t i = 0; i < count; ++i) out[i] = from[i] & keep[i];
     return;
   }
-  for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor) & keep[i];
+  for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], map) & keep[i];
 }
 
 // take_row() for whole samples, whose digits are high and low. next_high, next_low: as above.
 void take_deep_row(const uint8_t* HWY_RESTRICT high, const uint8_t* HWY_RESTRICT low,
-                   const uint8_t* HWY_RESTRICT keep, int low_bits, size_t count, float factor,
-                   const uint8_t* next_high, const uint8_t* next_low, uint16_t* HWY_RESTRICT out) {
+                   const uint8_t* HWY_RESTRICT keep, int low_bits, size_t count,
+                   const LevelMap& map, const uint8_t* next_high, const uint8_t* next_low,
+                   uint16_t* HWY_RESTRICT out) {
   for (size_t i = 0; i < count; i += 64) {
     hwy::Prefetch(next_high + i);
     hwy::Prefetch(next_low + i);
   }
-  if (factor == 1) {
+  if (map.factor == 1) {
     for (size_t i = 0; i < count; ++i)
       out[i] = static_cast<uint16_t>((high[i] << low_bits | low[i]) & keep[i] * 257);
     return;
   }
-  const auto most = static_cast<float>((256 << low_bits) - 1);
+  const auto unit = static_cast<float>(1 << low_bits);
+  const float bias = 0.5f + map.offset * unit, least = map.least * unit,
+              most = (map.most + 1) * unit - 1;
   for (size_t i = 0; i < count; ++i) {
-    const float level = static_cast<float>(high[i] << low_bits | low[i]) * factor + 0.5f;
-    out[i] = static_cast<uint16_t>(static_cast<int>(level < most ? level : most) & keep[i] * 257);
+    const float level = static_cast<float>(high[i] << low_bits | low[i]) * map.factor + bias;
+    const float below = level < most ? level : most;
+    out[i] = static_cast<uint16_t>(static_cast<int>(below > least ? below : least) & keep[i] * 257);
   }
 }
 
@@ -264,7 +268,8 @@ uint64_t Filler<Sample>::bytes(int snapshots) {
 }
 
 template <typename Sample>
-Filler<Sample>::Filler(int snapshots) : run_(run_of<Sample>(snapshots)) {
+Filler<Sample>::Filler(int snapshots, const SampleRange& range)
+    : run_(run_of<Sample>(snapshots)), range_(range) {
   const auto m = static_cast<size_t>(std::max(snapshots, 1)), planes = m * kChannels;
   keep_.resize(m * run_);
   masked_.resize(run_);
@@ -290,7 +295,7 @@ void Filler<Sample>::take_rows(const SnapshotRange& snapshots, const std::vector
     HWY_DYNAMIC_DISPATCH(expand_bits)(bits_.data(), padded, keep, masked_.data());
     for (int c = 0; c < kChannels; ++c) {
       const auto channel = static_cast<size_t>(c);
-      const float gain = gains[t][channel], factor = gain == 1 ? 1 : 1 / gain;
+      const LevelMap map = SampleLight(gains[t], range_).back(channel);
       Sample* const to = samples_.data() + (kChannels * t + channel) * run_;
       // Planes are padded like runs.
       const bool own = c == 0 || !snapshots.shape().is_shared();
@@ -298,14 +303,14 @@ void Filler<Sample>::take_rows(const SnapshotRange& snapshots, const std::vector
         const uint8_t* const from =
             read_samples(snapshots, snapshot, c, first, count, spread_.data());
         HWY_DYNAMIC_DISPATCH(take_row)
-        (from, keep, padded, factor, own ? snapshots.plane(next, c) + first : from, to);
+        (from, keep, padded, map, own ? snapshots.plane(next, c) + first : from, to);
       } else {
         const Samples from = read_whole_samples(snapshots, snapshot, c, first, count,
                                                 {spread_.data(), spread_.data() + run_});
         const Samples then = own ? snapshots.samples(next, c) + first : from;
         HWY_DYNAMIC_DISPATCH(take_deep_row)
-        (from.high, from.low, keep, bits_below(snapshots.depth()), padded, factor, then.high,
-         then.low, to);
+        (from.high, from.low, keep, bits_below(snapshots.depth()), padded, map,
+         then.high, then.low, to);
       }
     }
   }
@@ -345,9 +350,9 @@ template class Filler<uint8_t>;
 template class Filler<uint16_t>;
 
 void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
-                  const Gain& gain, const uint8_t* reach, const SampledRows& rows,
+                  const SampleLight& light, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]) {
-  const bool lit = is_lit(gain);
+  const bool lit = is_lit(light.gain);
   SampleFinder samples(x, reference.width);
   size_t sample = 0;
   for (int row = rows.first; row < rows.end; row += rows.step) {
@@ -365,7 +370,7 @@ void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const 
       for (size_t c = 0; c < 3; ++c) {
         const int level = reference.level[c][p];
         const uint8_t own = samples.at(c, static_cast<size_t>(col));
-        const int unit = lit ? out_of_light(own, gain[c]) : own;
+        const int unit = lit ? out_of_light(own, light, c) : own;
         out[c][sample] = static_cast<uint8_t>(std::clamp(unit, level - limit, level + limit));
       }
     }

@@ -17,7 +17,8 @@ template <typename Sample>
 class Filler {
  public:
   // Runs of up to run() pixels, a multiple of 64: they stay in the second-level cache.
-  explicit Filler(int snapshots);
+  // range: what light may make of samples.
+  explicit Filler(int snapshots, const SampleRange& range = {});
   static uint64_t bytes(int snapshots);
   Filler(Filler&&) = default;  // not copied: planes_ points into samples_
   size_t run() const { return run_; }
@@ -38,6 +39,7 @@ class Filler {
                  const WindowMask& mask, size_t first, size_t count);
 
   size_t run_;
+  SampleRange range_;
   std::vector<Sample> samples_;
   std::vector<uint8_t> keep_;
   std::vector<const Sample*> planes_;
@@ -50,7 +52,7 @@ class Filler {
 // drawn to that as Filler does to the median: for inner products. out: ceil(width / step) samples
 // of each of these rows a channel.
 void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
-                  const Gain& gain, const uint8_t* reach, const SampledRows& rows,
+                  const SampleLight& light, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]);
 
 }  // namespace qdmd

@@ -1,6 +1,7 @@
 // Pictures on a coarse grid: means over cells, on which regions are compared.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -49,6 +50,9 @@ class GridFrames {
   float* plane(int frame, int channel) { return levels_.data() + offset(frame, channel); }
   const float* plane(int frame, int channel) const {
     return levels_.data() + offset(frame, channel);
+  }
+  std::array<float*, kChannels> channels(int frame) {
+    return {plane(frame, 0), plane(frame, 1), plane(frame, 2)};
   }
 
  private:

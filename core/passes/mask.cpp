@@ -26,9 +26,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Passes over one row. What is a plain loop, the compiler makes vectors of for each instruction
 // set.
 
-void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, float factor,
+void scale_row(const uint8_t* HWY_RESTRICT from, size_t count, const LevelMap& map,
                uint8_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], factor);
+  for (size_t i = 0; i < count; ++i) out[i] = in_light(from[i], map);
 }
 
 // Rows of sums are read and written here only: in which order is no matter to others. They, and
@@ -236,11 +236,11 @@ size_t mask_scratch_bytes(int width, int height) {
   return bytes + bytes % 2;
 }
 
-void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
+void find_mask(const ReferencePicture& reference, const KeptPicture& x, const SampleLight& light,
                uint8_t* bits, uint8_t* scratch) noexcept {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
-  const bool lit = is_lit(gain);
+  const bool lit = is_lit(light.gain);
   const auto take = [&scratch](size_t bytes) { return std::exchange(scratch, scratch + bytes); };
   const size_t whole = whole_vectors(width);
   SumRing sums(reinterpret_cast<uint16_t*>(take(2 * whole * SumRing::kRows)), whole);
@@ -257,7 +257,7 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Ga
     for (size_t c = 0; c < 3; ++c) {
       l[c] = reference.level[c].data() + start;
       if (!lit) continue;
-      HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, gain[c], lit_rows[c]);
+      HWY_DYNAMIC_DISPATCH(scale_row)(l[c], width, light.into(c), lit_rows[c]);
       l[c] = lit_rows[c];
     }
     const uint8_t* row_of_x[3];
@@ -295,8 +295,8 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Ga
   }
 }
 
-GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
-                   const SampledRows& rows) {
+GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x,
+                   const SampleLight& light, const SampledRows& rows, int bright) {
   int64_t product[kChannels] = {}, square[kChannels] = {}, fit = 0, seen = 0;
   SampleFinder samples(x, reference.width);
   for (int row = rows.first; row < rows.end; row += rows.step) {
@@ -306,30 +306,38 @@ GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, cons
                      static_cast<size_t>(col);
       float squared = 0;
       int brightest = 0;
-      uint8_t own[kChannels];
+      int own[kChannels], level[kChannels];  // above dark
       for (size_t c = 0; c < 3; ++c) {
-        own[c] = samples.at(c, static_cast<size_t>(col));
+        const int sample = samples.at(c, static_cast<size_t>(col));
+        own[c] = sample - light.range.dark[c];
+        level[c] = reference.level[c][p] - light.range.dark[c];
         const float away =
-            static_cast<float>(own[c]) - static_cast<float>(reference.level[c][p]) * gain[c];
+            static_cast<float>(own[c]) - static_cast<float>(level[c]) * light.gain[c];
         squared += away * away;
-        brightest = std::max<int>(brightest, own[c]);
+        brightest = std::max(brightest, sample);
       }
       const float limit = reference.threshold[p];
-      if (squared >= limit * limit || brightest >= 250) continue;
+      if (squared >= limit * limit || brightest >= bright) continue;
       ++fit;
       for (size_t c = 0; c < 3; ++c) {
-        product[c] += own[c] * reference.level[c][p];
-        square[c] += reference.level[c][p] * reference.level[c][p];
+        product[c] += own[c] * level[c];
+        square[c] += level[c] * level[c];
       }
     }
   }
   return {product[0], product[1], product[2], square[0], square[1], square[2], fit, seen};
 }
 
-bool refine_gain(const GainSums& sums, Gain* gain) {
+bool refine_gain(const GainSums& sums, Gain* gain, bool one_gain) {
   const auto fit = static_cast<double>(sums[2 * kChannels]),
              seen = static_cast<double>(sums[2 * kChannels + 1]);
   if (fit < kLeastFits * seen) return false;
+  if (one_gain) {
+    const auto product = static_cast<double>(sums[0] + sums[1] + sums[2]),
+               square = static_cast<double>(sums[3] + sums[4] + sums[5]);
+    if (product > 0) gain->fill(static_cast<float>(product / square));
+    return true;
+  }
   for (size_t c = 0; c < kChannels; ++c)
     if (sums[c] > 0)
       (*gain)[c] = static_cast<float>(static_cast<double>(sums[c]) /

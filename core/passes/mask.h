@@ -39,7 +39,7 @@ constexpr int kMaskReach = 5;
 // the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes.
 // scratch: mask_scratch_bytes() at an even address, which can serve many calls; threads run this,
 // so it takes no memory.
-void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
+void find_mask(const ReferencePicture& reference, const KeptPicture& x, const SampleLight& light,
                uint8_t* bits, uint8_t* scratch) noexcept;
 size_t mask_scratch_bytes(int width, int height);
 
@@ -50,11 +50,14 @@ size_t mask_scratch_bytes(int width, int height);
 QDMD_STEP int kGainRounds = step("light.gain_rounds", 2);
 // Where a smaller share of the samples fits, the gain would be of what moves.
 QDMD_STEP double kLeastFits = step("light.least_fits", 0.1);
-// For each channel x times the reference, and the reference squared; pixels that fit; all.
+// bright: pixels with such a sample say no more than "at least". one_gain: all channels have the
+// same.
+// For each channel x times the reference, and the reference squared, both above dark; pixels that
+// fit; all.
 using GainSums = std::array<int64_t, 2 * kChannels + 2>;
-GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x, const Gain& gain,
-                   const SampledRows& rows);
-bool refine_gain(const GainSums& sums, Gain* gain);
+GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x,
+                   const SampleLight& light, const SampledRows& rows, int bright = 250);
+bool refine_gain(const GainSums& sums, Gain* gain, bool one_gain = false);
 
 // out[p] = the mean of the 5 x 5 samples around p; the border's samples stand for those outside.
 void blur(const uint8_t* plane, int width, int height, Pool* pool, uint8_t* out);

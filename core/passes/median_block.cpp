@@ -44,8 +44,10 @@ void take_median(const MedianNetwork<16>& network, size_t count, uint8_t (*sampl
 }
 
 // A plain loop, which the compiler makes vectors of.
-void scale_row(size_t count, float factor, uint8_t* samples) {
-  for (size_t i = 0; i < count; ++i) samples[i] = in_light(samples[i], factor);
+void scale_row(size_t count, const LevelMap& map, uint8_t* samples) {
+  // Samples may lie anywhere: for the compiler, even there.
+  const LevelMap own = map;
+  for (size_t i = 0; i < count; ++i) samples[i] = in_light(samples[i], own);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -151,8 +153,8 @@ class BlockLayout {
       copy(frame, channel, across_, down_, few);
       spread(few, to);
     }
-    if (const float factor = frame.inverse[channel]; factor != 1)
-      HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), factor, to);
+    if (const LevelMap& map = frame.map[channel]; map.factor != 1)
+      HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), map, to);
   }
   // Copies the samples that pixels share.
   void spread(const uint8_t* samples, uint8_t* to) const {

@@ -24,12 +24,16 @@ struct MedianBlock {
 };
 
 // What a frame has at a block, in each channel: the first sample, how far its rows are apart, and
-// what the samples are multiplied by.
+// what becomes of the samples.
 struct MedianFrame {
   const uint8_t* first[kChannels];
   size_t stride[kChannels];
-  float inverse[kChannels];
+  LevelMap map[kChannels];
   bool is_shared = false;
+
+  void take_out(const SampleLight& light) {
+    for (size_t c = 0; c < kChannels; ++c) map[c] = light.back(c);
+  }
 };
 
 // The medians of `count` <= kMedianFrames frames. background[c]: these, the mean of the middle two,

@@ -4,11 +4,15 @@
 #include <functional>
 #include <numbers>
 #include <random>
+#include <string>
+#include <tuple>
 
 #include "core/foreground/grey.h"
 #include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/exposure_watch.h"
 #include "core/learn/robust/light.h"
+#include "core/passes/rgb_colours.h"
+#include "core/passes/unit_light.h"
 #include "core/scene/scene.h"
 #include "tests/core/robust_util.h"
 
@@ -83,6 +87,74 @@ TEST(ClippedSamples, WhiteThatStaysIsNoSwing) {
   for (const Gain& gain : light.gains) EXPECT_EQ(gain, kSameLight);
 }
 
+// ---- Y, U and V ----
+
+TEST(RgbColours, AreThoseOfTheStandard) {
+  const RgbColours video(Colours::yuv, kVideo);
+  for (const float r : {0.0f, 40.0f, 255.0f})
+    for (const float g : {0.0f, 150.0f, 255.0f})
+      for (const float b : {0.0f, 90.0f, 255.0f}) {
+        const auto yuv = yuv_of(r, g, b);
+        const auto rgb = video.rgb(yuv), back = video.sample({r, g, b});
+        // The standard's matrices have six digits.
+        const std::array<float, 3> truth = {r, g, b};
+        for (size_t c = 0; c < 3; ++c) {
+          EXPECT_NEAR(rgb[c], truth[c], 1e-3 * 255);
+          EXPECT_NEAR(back[c], yuv[c], 1e-3 * 255);
+        }
+      }
+  EXPECT_FALSE(RgbColours(Colours::rgb, {}).converts());
+  EXPECT_EQ(RgbColours(Colours::grey, {}).rgb({1, 2, 3}), (std::array<float, 3>{1, 2, 3}));
+}
+
+// A saturated wall in more light: its R ends, and the samples are those of what is left.
+TEST(RgbColours, EndWhereTheSensorDoes) {
+  const RgbColours video(Colours::yuv, kVideo);
+  auto bright = yuv_of(1.5f * 220, 1.5f * 90, 1.5f * 60);
+  float* const rows[3] = {&bright[0], &bright[1], &bright[2]};
+  video.clip(1, rows);
+  const auto truth = yuv_of(255, 135, 90);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(bright[c], truth[c], 0.3);
+
+  // Known at the end, and seen in 0.8 of the light: R is at least 204, whatever it is beyond.
+  const auto sample = [](const std::array<float, 3>& of) {
+    return std::array<uint8_t, 3>{byte_of(of[0]), byte_of(of[1]), byte_of(of[2])};
+  };
+  auto known = sample(yuv_of(0.8f * 255, 0.8f * 100, 0.8f * 60));
+  const auto seen = sample(yuv_of(240, 80, 48)), darker = sample(yuv_of(150, 80, 48));
+  uint8_t* const level[3] = {&known[0], &known[1], &known[2]};
+  const auto before = known;
+  const auto raise = [&](const std::array<uint8_t, 3>& by) {
+    known = before;
+    const uint8_t* const x[3] = {&by[0], &by[1], &by[2]};
+    video.raise_ends(1, 245, {0.8f, 0.8f, 0.8f}, x, level);
+  };
+  raise(seen);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(known[c], seen[c], 2);
+  raise(darker);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(known[c], before[c], 1);
+}
+
+// Black and what has no colour stay in any light, and white is the end.
+TEST(SampleLights, LeaveWhatIsDark) {
+  const SampleRange range = kVideo.range();
+  EXPECT_EQ(range.least, (std::array<uint8_t, 3>{16, 16, 16}));
+  EXPECT_EQ(range.most, (std::array<uint8_t, 3>{235, 240, 240}));
+  const SampleLight light({2, 2, 2}, range);
+  EXPECT_EQ(in_light(16, light.into(0)), 16);
+  EXPECT_EQ(in_light(66, light.into(0)), 116);
+  EXPECT_EQ(in_light(200, light.into(0)), 235);
+  EXPECT_EQ(in_light(128, light.into(1)), 128);
+  EXPECT_EQ(in_light(118, light.into(1)), 108);
+  EXPECT_EQ(out_of_light(116, light, 0), 66);
+  EXPECT_EQ(out_of_light(108, light, 2), 118);
+  // Full range, and R, G and B: all bytes.
+  EXPECT_EQ(Levels{}.range().most, (std::array<uint8_t, 3>{255, 255, 255}));
+  const Levels full = {{0, 128, 128}, {255, 128, 128}};
+  EXPECT_EQ(full.range().least, (std::array<uint8_t, 3>{0, 0, 0}));
+  EXPECT_EQ(full.range().dark, (std::array<uint8_t, 3>{0, 128, 128}));
+}
+
 // ---- Colours ----
 
 TEST(Grey, IsToldByTheContent) {
@@ -129,9 +201,8 @@ TEST(ColourMaps, InfraRedIsFoundBehindPeople) {
   }
   const float* const before[3] = {scene[0].data(), scene[1].data(), scene[2].data()};
   const float* const now[3] = {frame[0].data(), frame[1].data(), frame[2].data()};
-  EXPECT_EQ(colouring_of(before, kCells, Colours::rgb), Colouring::some);
-  EXPECT_EQ(colouring_of(now, kCells, Colours::rgb), Colouring::none);
-  EXPECT_EQ(colouring_of(now, kCells, Colours::grey), Colouring::little);
+  EXPECT_EQ(colouring_of(before, kCells), Colouring::some);
+  EXPECT_EQ(colouring_of(now, kCells), Colouring::none);
   const auto map = find_colour_map(now, before, kCells);
   ASSERT_TRUE(map);
   for (const auto& row : map->row) {
@@ -216,6 +287,14 @@ const Camera kCameras[] = {
     {"grey", [](int, float, float luma) { return luma; }, 100},
 };
 
+// R, G and B as Y, U and V of ITU-R BT.601 in 16 .. 235.
+std::array<float, 3> yuv_of(float r, float g, float b) {
+  const float y = 0.299f * r + 0.587f * g + 0.114f * b;
+  return {16 + 219 / 255.0f * y, 128 + 112 / 255.0f / 0.886f * (b - y),
+          128 + 112 / 255.0f / 0.701f * (r - y)};
+}
+constexpr Levels kVideo = {{16, 128, 128}, {235, 128, 128}};
+
 // F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
 // picture.
 std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed) {
@@ -250,8 +329,10 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
     for (size_t p = 0; p < size_t{kWidth} * kHeight; ++p) {
       const float luma =
           0.299f * samples[3 * p] + 0.587f * samples[3 * p + 1] + 0.114f * samples[3 * p + 2];
-      for (size_t c = 0; c < 3; ++c)
-        planes[c * kWidth * kHeight + p] = byte_of(camera.shows(t, samples[3 * p + c], luma));
+      std::array<float, 3> shown;
+      for (size_t c = 0; c < 3; ++c) shown[c] = byte_of(camera.shows(t, samples[3 * p + c], luma));
+      if (options.colours == Colours::yuv) shown = yuv_of(shown[0], shown[1], shown[2]);
+      for (size_t c = 0; c < 3; ++c) planes[c * kWidth * kHeight + p] = byte_of(shown[c]);
       is_foreground.push_back(scene.labels().samples[p] > 127);
     }
     picture.fill(planes);
@@ -264,17 +345,22 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
   return {2 * both / sum, wrong};
 }
 
-class CameraLight : public testing::TestWithParam<Mode> {};
-INSTANTIATE_TEST_SUITE_P(Modes, CameraLight, testing::Values(Mode::batch, Mode::live),
-                         [](const auto& mode) {
-                           return mode.param == Mode::live ? "Live" : "Batch";
+class CameraLight : public testing::TestWithParam<std::tuple<Mode, Colours>> {};
+INSTANTIATE_TEST_SUITE_P(Modes, CameraLight,
+                         testing::Combine(testing::Values(Mode::batch, Mode::live),
+                                          testing::Values(Colours::rgb, Colours::yuv)),
+                         [](const auto& of) {
+                           const auto [mode, colours] = of.param;
+                           return std::string(mode == Mode::live ? "Live" : "Batch") +
+                                  (colours == Colours::yuv ? "Yuv" : "Rgb");
                          });
 
 TEST_P(CameraLight, MasksStayRight) {
   for (const Camera& camera : kCameras)
     for (const uint64_t seed : {3, 7}) {
       EngineOptions options = robust_of(100);
-      options.mode = GetParam();
+      std::tie(options.mode, options.colours) = GetParam();
+      if (options.colours == Colours::yuv) options.levels = kVideo;
       const auto [f, wrong] = score(camera, options, seed);
       RecordProperty(camera.name, std::to_string(f));
       EXPECT_GE(f, 0.9) << camera.name << ", seed " << seed;

@@ -16,10 +16,36 @@ uint8_t rounded(float level) {
   return static_cast<uint8_t>(std::clamp(level + 0.5f, 0.0f, 255.0f));
 }
 
+// The map of samples that is `map` of cells.
+ColourMap of_samples(const ColourMap& map, const RgbColours& colours) {
+  Eigen::Matrix3d to_cells, of_cells;
+  Eigen::Vector3d offset, added;
+  for (int c = 0; c < kChannels; ++c) {
+    const auto row = static_cast<size_t>(c);
+    for (int k = 0; k < kChannels; ++k) {
+      to_cells(c, k) = static_cast<double>(colours.matrix()[row][static_cast<size_t>(k)]);
+      of_cells(c, k) = static_cast<double>(map.row[row][static_cast<size_t>(k)]);
+    }
+    offset(c) = static_cast<double>(colours.offset()[row]);
+    added(c) = static_cast<double>(map.row[row][kChannels]);
+  }
+  const Eigen::Matrix3d back = to_cells.inverse();
+  const Eigen::Matrix3d all = back * of_cells * to_cells;
+  const Eigen::Vector3d constant = back * (of_cells * offset + added - offset);
+  ColourMap found;
+  for (int c = 0; c < kChannels; ++c) {
+    auto& row = found.row[static_cast<size_t>(c)];
+    for (int k = 0; k < kChannels; ++k) row[static_cast<size_t>(k)] = static_cast<float>(all(c, k));
+    row[kChannels] = static_cast<float>(constant(c));
+  }
+  return found;
+}
+
 }  // namespace
 
 std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
-                                         const float* const background[kChannels], size_t cells) {
+                                         const float* const background[kChannels], size_t cells,
+                                         const RgbColours& colours) {
   std::vector<float> away(cells, 0);
   ColourMap map = {};
   float limit = 0;
@@ -53,21 +79,17 @@ std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
     std::nth_element(sorted.begin(), at, sorted.end());
     limit = *at;
   }
-  return limit < kChannels * kExplained ? std::optional(map) : std::nullopt;
+  if (limit >= kChannels * kExplained) return std::nullopt;
+  return colours.converts() ? of_samples(map, colours) : map;
 }
 
-Colouring colouring_of(const float* const cells[kChannels], size_t count, Colours colours) {
-  if (colours == Colours::grey) return Colouring::little;
-  constexpr float kNeutral = 128;
+Colouring colouring_of(const float* const cells[kChannels], size_t count) {
   constexpr size_t kEach = 5;  // of so many cells one says enough
   double colour = 0, level = 0;
   for (size_t cell = 0; cell < count; cell += kEach) {
     const float a = cells[0][cell], b = cells[1][cell], c = cells[2][cell];
-    const float spread = colours == Colours::yuv
-                             ? std::max(std::abs(b - kNeutral), std::abs(c - kNeutral))
-                             : std::max({a, b, c}) - std::min({a, b, c});
-    colour += static_cast<double>(spread);
-    level += static_cast<double>(colours == Colours::yuv ? a : (a + b + c) / 3);
+    colour += static_cast<double>(std::max({a, b, c}) - std::min({a, b, c}));
+    level += static_cast<double>((a + b + c) / 3);
   }
   if (colour < kNone * level) return Colouring::none;
   return colour > kSome * level ? Colouring::some : Colouring::little;

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "core/base/channels.h"
-#include "core/base/colours.h"
 #include "core/model/learnt.h"
+#include "core/passes/rgb_colours.h"
 
 namespace qdmd {
 
@@ -25,13 +25,15 @@ struct ColourMap {
 };
 
 // Least squares over the cells of a frame and of a background, without those that fit worst: what
-// is in front. Nothing where no map explains most of them.
+// is in front. The map is one of samples, whose cells have these `colours`. Nothing where no map
+// explains most of them.
 std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
-                                         const float* const background[kChannels], size_t cells);
+                                         const float* const background[kChannels], size_t cells,
+                                         const RgbColours& colours = {});
 
 // How coloured a picture is: none where hardly any cell has a colour, some where many have.
 enum class Colouring { none, little, some };
-Colouring colouring_of(const float* const cells[kChannels], size_t count, Colours colours);
+Colouring colouring_of(const float* const cells[kChannels], size_t count);
 
 // `count` pixels of a picture, and what a window knows.
 void recolour(const ColourMap& map, size_t count, uint8_t* const level[kChannels]);

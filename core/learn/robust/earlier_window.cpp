@@ -45,11 +45,10 @@ void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
   known_ = true;
 }
 
-void EarlierWindow::recolour(const Grid& grid, const ColourMap& map) {
+void EarlierWindow::recolour(const RobustContext& context, const ColourMap& map) {
   uint8_t* const level[kChannels] = {level_[0].data(), level_[1].data(), level_[2].data()};
   qdmd::recolour(map, level_[0].size(), level);
-  for (size_t c = 0; c < kChannels; ++c)
-    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
+  context.find_cells(level, &cells_, 0);
 }
 
 void EarlierWindow::write(const Grid& grid, Learnt::EarlierWindow* out) const {
@@ -62,17 +61,17 @@ void EarlierWindow::write(const Grid& grid, Learnt::EarlierWindow* out) const {
   out->looked = looked_;
 }
 
-void EarlierWindow::read(const Grid& grid, const Learnt::EarlierWindow& from) {
+void EarlierWindow::read(const RobustContext& context, const Learnt::EarlierWindow& from) {
+  const Grid& grid = context.grid;
   // Memory first, and the old content stays until all of it is there.
   for (size_t c = 0; c < kChannels; ++c) level_[c].reserve(from.level[c].size());
   spread_.reserve(from.spread.size());
   weight_.reserve(grid.cells());
   limit_.reserve(grid.cells());
   looked_.reserve(grid.cells());
-  for (size_t c = 0; c < kChannels; ++c) {
-    level_[c] = from.level[c];
-    cell_means(grid, level_[c].data(), cells_.plane(0, static_cast<int>(c)));
-  }
+  for (size_t c = 0; c < kChannels; ++c) level_[c] = from.level[c];
+  const uint8_t* const level[kChannels] = {level_[0].data(), level_[1].data(), level_[2].data()};
+  context.find_cells(level, &cells_, 0);
   spread_ = from.spread;
   weight_.resize(grid.cells());
   limit_.resize(grid.cells());

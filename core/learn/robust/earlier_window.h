@@ -3,6 +3,7 @@
 
 #include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/median_picture.h"
+#include "core/learn/robust/robust_context.h"
 #include "core/model/learnt.h"
 #include "core/passes/mask.h"
 
@@ -37,12 +38,12 @@ class EarlierWindow {
             const StableFrames& stable, int count, float fresh, const std::vector<uint8_t>& held);
 
   // Its background in other colours.
-  void recolour(const Grid& grid, const ColourMap& map);
+  void recolour(const RobustContext& context, const ColourMap& map);
 
   // What is known, for a file and back; its grid may be another, and each cell then knows what the
   // one at its middle did. Where read() throws, all is as it was.
   void write(const Grid& grid, Learnt::EarlierWindow* out) const;
-  void read(const Grid& grid, const Learnt::EarlierWindow& from);
+  void read(const RobustContext& context, const Learnt::EarlierWindow& from);
 
  private:
   bool known_ = false;  // set last: what follows is whole

@@ -115,9 +115,8 @@ SceneSeen FrameFollower::scene_of(int slot) {
 SceneSeen FrameFollower::colours_of(const Cells& frame) {
   const size_t cells = context_.grid.cells();
   const Cells background = this->background();
-  const Colours colours = context_.options.colours;
-  const Colouring now = colouring_of(frame, cells, colours),
-                  known = colouring_of(background, cells, colours);
+  if (context_.options.colours == Colours::grey) return SceneSeen::same;
+  const Colouring now = colouring_of(frame, cells), known = colouring_of(background, cells);
   const bool other = scene_.shows_background() && now != known && now != Colouring::little &&
                      known != Colouring::little;
   other_coloured_ = other ? other_coloured_ + 1 : 0;
@@ -126,7 +125,8 @@ SceneSeen FrameFollower::colours_of(const Cells& frame) {
   // Somebody in colours may come before a grey wall.
   if (!returns && now != Colouring::none) return SceneSeen::same;
   new_colours_.reset();
-  if (now == Colouring::none) new_colours_ = find_colour_map(frame, background, cells);
+  if (now == Colouring::none)
+    new_colours_ = find_colour_map(frame, background, cells, context_.rgb);
   if (!returns && !new_colours_) return SceneSeen::same;
   other_coloured_ = 0;
   colours_begin_ = true;
@@ -162,8 +162,8 @@ void FrameFollower::read(const LearntEarlier& from) {
 }
 
 void FrameFollower::follow(const std::vector<uint8_t> level[kChannels]) {
-  for (int c = 0; c < kChannels; ++c)
-    cell_means(context_.grid, level[c].data(), background_cells_.plane(published_, c));
+  const uint8_t* const planes[kChannels] = {level[0].data(), level[1].data(), level[2].data()};
+  context_.find_cells(planes, &background_cells_, published_);
 }
 
 }  // namespace qdmd

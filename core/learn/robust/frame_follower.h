@@ -58,8 +58,8 @@ class FrameFollower {
   // are others; null: nobody knows.
   const ColourMap* new_colours() const { return new_colours_ ? &*new_colours_ : nullptr; }
   Gain light(int slot) {
-    return light_over(context_.room.frames->cells(), slot, background_cells_, published_,
-                      &light_scratch_);
+    return context_.of_format(light_over(context_.room.frames->cells(), slot, background_cells_,
+                                         published_, &light_scratch_));
   }
 
  private:

@@ -8,13 +8,13 @@ namespace qdmd {
 
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread) {
-  median_picture(grid, Band(grid.height), stable, frames, pool, background, spread);
+                    uint8_t* spread, const SampleRange& range) {
+  median_picture(grid, Band(grid.height), stable, frames, pool, background, spread, range);
 }
 
 void median_picture(const Grid& grid, const Band& band, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread) {
+                    uint8_t* spread, const SampleRange& range) {
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
@@ -38,8 +38,8 @@ void median_picture(const Grid& grid, const Band& band, const StableFrames& stab
         for (size_t c = 0; c < kChannels; ++c) {
           at[i].stride[c] = static_cast<size_t>(
               c > 0 && at[i].is_shared ? frame.shape.chroma_width() : grid.width);
-          at[i].inverse[c] = 1 / frame.gain[c];
         }
+        at[i].take_out({frame.gain, range});
       }
       const int left = grid.left(col), right = grid.left(col + 1);
       const int most = std::min(kMedianBlock, right - left), tall = kMedianBlock / most;

@@ -16,13 +16,14 @@ struct LitPicture {
 
 // background[c][p]: the median over the frames of p's cell, in unit light; more than kMedianFrames
 // are thinned evenly. spread[p]: the median of their quaternion distances from it, in steps of 1/4
-// level, up to 255. frames[i]: what stable frame i is.
+// level, up to 255. frames[i]: what stable frame i is. range: what light may
+// make of samples.
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread);
+                    uint8_t* spread, const SampleRange& range = {});
 // As above, where planes have the band's rows only.
 void median_picture(const Grid& grid, const Band& band, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread);
+                    uint8_t* spread, const SampleRange& range = {});
 
 }  // namespace qdmd

@@ -43,7 +43,9 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
   if (!model) return;
   const Cells background = this->background();
   model->set_time(frame.t);
-  const ContourPictures pictures = {frame.around, frame.at, light, model, model->light(frame.t)};
+  const SampleRange range = context_.range();
+  const ContourPictures pictures = {
+      frame.around, frame.at, {light, range}, model, {model->light(frame.t), range}, context_.rgb};
   std::vector<int> left = memory_.judge(background, [&](const std::vector<int>& region) {
     return contours_of(context_.grid, region, pictures);
   });
@@ -140,9 +142,11 @@ void FrameFollower::replace_deep(const std::vector<int>& cells, const LitFrames&
           // In order: there are a few.
           double samples[Learner::kMendingFrames];
           for (int t = 0; t < frames.size(); ++t) {
-            const Gain& light = lit.at[static_cast<size_t>(t)].light;
+            const SampleLight light(lit.at[static_cast<size_t>(t)].light, context_.range());
+            const auto channel = static_cast<size_t>(c);
             const double sample =
-                read_sample(frames, t, c, p) / static_cast<double>(light[static_cast<size_t>(c)]);
+                read_sample(frames, t, c, p) / static_cast<double>(light.gain[channel]) +
+                static_cast<double>(light.back(channel).offset) / unit;
             int at = t;
             for (; at > 0 && samples[at - 1] > sample; --at) samples[at] = samples[at - 1];
             samples[at] = sample;
@@ -162,8 +166,7 @@ void FrameFollower::replace(const std::vector<int>& cells, const StandingLooks& 
   const SnapshotRange& frames = lit.frames;
   const auto count = static_cast<size_t>(frames.size());
   MedianFrame at[Learner::kMendingFrames] = {};  // of blocks of one row
-  for (size_t i = 0; i < count; ++i)
-    for (size_t c = 0; c < kChannels; ++c) at[i].inverse[c] = 1 / lit.at[i].light[c];
+  for (size_t i = 0; i < count; ++i) at[i].take_out({lit.at[i].light, context_.range()});
   const auto stride = static_cast<size_t>(context_.grid.width);
   for (int cell : cells) {
     const int row = cell / context_.grid.cols, col = cell % context_.grid.cols;

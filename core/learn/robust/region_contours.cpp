@@ -81,10 +81,18 @@ struct Pixels {
       for (size_t c = 0; c < kChannels; ++c) {
         const uint8_t* const samples =
             read_samples(from.frames, from.at, static_cast<int>(c), first, run, room);
+        const float of_look = from.light.back(c).offset,
+                    of_background = from.model_light.back(c).offset;
         for (size_t i = 0; i < run; ++i) {
-          look[c][to + i] = static_cast<float>(samples[i]) / from.light[c];
-          background[c][to + i] = static_cast<float>(level[c][i]) / from.model_light[c];
+          look[c][to + i] = static_cast<float>(samples[i]) / from.light.gain[c] + of_look;
+          background[c][to + i] =
+              static_cast<float>(level[c][i]) / from.model_light.gain[c] + of_background;
         }
+      }
+      for (auto* planes : {look, background}) {
+        float* const row[kChannels] = {planes[0].data() + to, planes[1].data() + to,
+                                       planes[2].data() + to};
+        from.colours.convert(run, row);
       }
     }
   }

@@ -5,6 +5,7 @@
 
 #include "core/model/background_model.h"
 #include "core/passes/grid.h"
+#include "core/passes/rgb_colours.h"
 #include "core/planes/snapshot_range.h"
 
 namespace qdmd {
@@ -21,9 +22,10 @@ struct RegionContours {
 struct ContourPictures {
   SnapshotRange frames;
   int at = 0;  // which of them
-  Gain light = kSameLight;
+  SampleLight light = kSameLight;
   const BackgroundModel* model = nullptr;  // set to a time whose light is `model_light`
-  Gain model_light = kSameLight;
+  SampleLight model_light = kSameLight;
+  RgbColours colours = {};  // edges are those of R, G and B
 };
 
 // The border is found in full resolution: around those pixels of the region's cells, and of the

@@ -16,10 +16,11 @@ struct RobustContext {
   Grid grid;  // of the whole picture
   int finest_step = 1, step = 1;
   LearnerRoom room = {};
+  RgbColours rgb = {options.colours, options.levels};
 
   // What is kept of each frame.
   FrameContents contents() const {
-    FrameContents contents = {1, parameters.cells_along, 1, 1, options.depth};
+    FrameContents contents = {1, parameters.cells_along, 1, 1, options.depth, rgb};
     if (options.keeps_shared()) {
       contents.chroma_columns = options.chroma_columns;
       contents.chroma_rows = options.chroma_rows;
@@ -30,6 +31,24 @@ struct RobustContext {
   ChromaShape shape() const {
     const FrameContents of = contents();
     return {grid.width, band.rows(), of.chroma_columns, of.chroma_rows};
+  }
+  // Light is a gain of R, G and B: of Y, U and V it is the same one, that of brightness.
+  bool one_gain() const { return options.colours == Colours::yuv; }
+  Gain of_format(Gain gain) const {
+    if (one_gain()) gain.fill(0.299f * gain[0] + 0.587f * gain[1] + 0.114f * gain[2]);
+    return gain;
+  }
+  // What light may make of samples.
+  SampleRange range() const { return options.levels.range(); }
+  // Samples from here on may be at the end of their range. Chroma has no such end: black.
+  int end_of_range(size_t channel) const {
+    const Levels& of = options.levels;
+    return of.black[channel] + (of.white[channel] - of.black[channel]) * 250 / 255;
+  }
+  // The cells of a picture's planes.
+  void find_cells(const uint8_t* const plane[kChannels], GridFrames* cells, int frame) const {
+    for (int c = 0; c < kChannels; ++c) cell_means(grid, plane[c], cells->plane(frame, c));
+    rgb.convert(cells->cells(), cells->channels(frame).data());
   }
   size_t pixels() const {
     return static_cast<size_t>(grid.width) * static_cast<size_t>(band.rows());

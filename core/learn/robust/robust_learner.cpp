@@ -26,6 +26,10 @@ static RobustContext context_of(const LearnOptions& options, int width, const Ba
   RobustContext context = {options, parameters,
                            band,    Grid(width, band.height(), parameters.cells_along),
                            finest,  finest};
+  // Levels are those of R, G and B.
+  const double level = level_of(options.colours);
+  for (int* of : {&context.parameters.least_threshold, &context.parameters.least_limit})
+    *of = static_cast<int>(std::lround(level * *of));
   // What the paper fits to the first frame depends on what stood there.
   context.options.dmd.amplitude = Amplitude::window;
   if (context.options.dmd.rank == 0) context.options.dmd.rank = 1;
@@ -134,7 +138,7 @@ void RobustLearner::remember(Learnt* learnt) const {
 void RobustLearner::recall(const Learnt& learnt) {
   if (context_.parameters.earlier_share <= 0) return;
   if (!learnt.earlier) return memory_.earlier()->forget();
-  memory_.earlier()->read(context_.grid, *learnt.earlier);
+  memory_.earlier()->read(context_, *learnt.earlier);
   follower_.read(*learnt.earlier);
 }
 
@@ -165,6 +169,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
                                              solve_.reference().level[1].data(),
                                              solve_.reference().level[2].data()};
     find_own_cells(context_.grid, context_.band, level, cells, next, context_.room.pool);
+    context_.rgb.convert(cells->cells(), cells->channels(next).data());
     share_cells(context_.grid, context_.band, cells, next);
     model->set_gains(solve_.gains_of_frames(*cells, next));
     memory_.take(solve_, *cells, next, history_.held());

@@ -39,7 +39,7 @@ void StreamMemory::begin_scene(bool returns) {
 void StreamMemory::recolour(const ColourMap& map) {
   if (!left_.known()) return;
   earlier_ = left_;
-  earlier_.recolour(context_.grid, map);
+  earlier_.recolour(context_, map);
 }
 
 void StreamMemory::begin_from_here() {

@@ -35,6 +35,7 @@ void WindowSolve::begin() {
   for (auto& level : reference_.level) level.resize(pixels);
   reference_.threshold.resize(pixels);
   spread_.resize(pixels);
+  if (context_.rgb.converts()) brightest_.resize(pixels);
   // Runs read to their end.
   reach_.resize(room.frames->window().plane_size());
 }
@@ -57,9 +58,10 @@ uint64_t WindowSolve::bytes(const RobustContext& context, int window_size, Model
                             int threads) {
   const int snapshots = thinning_of(models).most_snapshots(window_size);
   const uint64_t looks = most_looks(context, window_size, models), pixels = context.pixels();
-  // The reference: levels, spread, threshold, reach.
-  return pixels * (kChannels + 3) + StableFrames::bytes(context.grid, looks) +
-         StableFramesRoom::bytes(context.grid, looks) + WindowMask::bytes(snapshots, pixels) +
+  // The reference: levels, spread, threshold, reach, and what is brightest.
+  return pixels * (kChannels + (context.rgb.converts() ? 4 : 3)) +
+         StableFrames::bytes(context.grid, looks) + StableFramesRoom::bytes(context.grid, looks) +
+         WindowMask::bytes(snapshots, pixels) +
          PlaneSlots::bytes(snapshots, context.samples_at(context.finest_step)) +
          SlidingGram::bytes(snapshots, threads) + static_cast<uint64_t>(window_size) * sizeof(Gain);
 }
@@ -117,12 +119,13 @@ DmdSummary WindowSolve::solve(const SnapshotRange& window, int64_t first, const 
 
 void WindowSolve::find_foreground(const SolveHistory& history) {
   const SnapshotRange& snapshots = window_->snapshots;
+  find_brightest();
   // Taken here: tasks of the pool take no memory.
   const size_t scratch_size = mask_scratch_bytes(reference_.width, reference_.height);
   const auto scratch =
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * context_.room.pool->threads());
   mask_.find_all(snapshots.size(), context_.room.pool, [&](int t, size_t worker, uint8_t* bits) {
-    find_mask(reference_, snapshots.picture(t), gains_[static_cast<size_t>(t)], bits,
+    find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
     if (clips_) fill_ends(t, bits);
@@ -132,15 +135,31 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
 // Takes out what the background would show at the end of the samples' range: such a sample says
 // only that it is at least so bright.
 void WindowSolve::fill_ends(int snapshot, uint8_t* bits) const {
+  constexpr float kEnd = 250;
   const Gain& gain = gains_[static_cast<size_t>(snapshot)];
   if (!is_lit(gain)) return;
-  for (size_t c = 0; c < kChannels; ++c) {
-    const uint8_t* const level = reference_.level[c].data();
-    const auto least = static_cast<int>(std::ceil(250 / gain[c]));
-    if (gain[c] <= 1 || least > 255) continue;
+  const auto take_out = [&](const uint8_t* level, float of) {
+    const auto least = static_cast<int>(std::ceil(kEnd / of));
+    if (of <= 1 || least > 255) return;
     for (size_t p = 0; p < context_.pixels(); ++p)
       bits[p / 8] = static_cast<uint8_t>(bits[p / 8] | (level[p] >= least) << (p % 8));
-  }
+  };
+  if (!brightest_.empty()) return take_out(brightest_.data(), gain[0]);
+  for (size_t c = 0; c < kChannels; ++c) take_out(reference_.level[c].data(), gain[c]);
+}
+
+// The largest of R, G and B of the background's pixels, where samples are others.
+void WindowSolve::find_brightest() {
+  if (!clips_ || brightest_.empty()) return;
+  in_runs([&](size_t first, size_t count) {
+    float rgb[kChannels][kMaxRun];
+    float* const rows[kChannels] = {rgb[0], rgb[1], rgb[2]};
+    for (size_t c = 0; c < kChannels; ++c)
+      std::copy_n(reference_.level[c].data() + first, count, rgb[c]);
+    context_.rgb.convert(count, rows);
+    for (size_t p = 0; p < count; ++p)
+      brightest_[first + p] = static_cast<uint8_t>(std::max({rgb[0][p], rgb[1][p], rgb[2][p]}));
+  });
 }
 
 Decomposition WindowSolve::decompose_filled() {
@@ -158,7 +177,7 @@ Decomposition WindowSolve::decompose_filled() {
       mask_.read(t, own_bits);
       uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
                                samples_.plane(slot, 2)};
-      fill_samples(reference_, own_bits, snapshots.picture(t), gains_[part], reach_.data(),
+      fill_samples(reference_, own_bits, snapshots.picture(t), light(t), reach_.data(),
                    context_.sampled_rows(), out);
     });
     gram_.add_newest(samples_, samples_.size());
@@ -175,7 +194,8 @@ template <typename Sample>
 void WindowSolve::combine(BackgroundModel* model) {
   const SnapshotRange& snapshots = window_->snapshots;
   std::vector<Filler<Sample>> fillers;
-  for (size_t i = 0; i < context_.room.pool->threads(); ++i) fillers.emplace_back(snapshots.size());
+  for (size_t i = 0; i < context_.room.pool->threads(); ++i)
+    fillers.emplace_back(snapshots.size(), context_.range());
   const size_t run = fillers[0].run();
   context_.room.pool->run((context_.pixels() + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, context_.pixels() - first);
@@ -213,14 +233,15 @@ void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector
   const auto gain_of = [&](size_t i) -> Gain& { return (*gains)[static_cast<size_t>(frames[i])]; };
   for (int round = 0; round < kGainRounds; ++round) {
     context_.room.pool->run(frames.size(), [&](size_t i) {
-      sums[i] = goes_on[i] ? gain_sums(reference_, snapshots.picture(frames[i]), gain_of(i),
-                                       context_.sampled_rows())
+      sums[i] = goes_on[i] ? gain_sums(reference_, snapshots.picture(frames[i]),
+                                       {gain_of(i), context_.range()}, context_.sampled_rows(),
+                                       context_.end_of_range(0))
                            : GainSums{};
     });
     if (Team* team = context_.band.team(); team && !sums.empty())
       team->sum(Talk::light, {sums.front().data(), sums.size() * sums.front().size()});
     for (size_t i = 0; i < frames.size(); ++i)
-      if (goes_on[i]) goes_on[i] = refine_gain(sums[i], &gain_of(i));
+      if (goes_on[i]) goes_on[i] = refine_gain(sums[i], &gain_of(i), context_.one_gain());
   }
 }
 

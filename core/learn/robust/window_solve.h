@@ -80,9 +80,13 @@ class WindowSolve {
   void take_unit_of(const GridFrames& earlier, GridFrames* here);
   void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
   void prefer_darker(const Looks& looks, const GridPictures& chosen);
+  void find_brightest();
   void fill_ends(int snapshot, uint8_t* bits) const;
   void take_background(const Looks& looks, const EarlierWindow& earlier);
   void recall_spread(const EarlierWindow& earlier, std::vector<uint8_t>* spread) const;
+  SampleLight light(int snapshot) const {
+    return {gains_[static_cast<size_t>(snapshot)], context_.range()};
+  }
   void refine_light();
   void refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
                     std::vector<Gain>* gains);
@@ -107,10 +111,11 @@ class WindowSolve {
   StableFramesRoom stable_room_;
   ReferencePicture reference_;
   std::vector<uint8_t> spread_, reach_;
-  std::vector<Gain> gains_;  // of the snapshots
-  bool clips_ = false;       // WindowLight::clips
-  WindowMask mask_;          // of the snapshots
-  Window samples_;           // filled
+  std::vector<uint8_t> brightest_;  // of R, G and B of the background, where samples are others
+  std::vector<Gain> gains_;         // of the snapshots
+  bool clips_ = false;              // WindowLight::clips
+  WindowMask mask_;                 // of the snapshots
+  Window samples_;                  // filled
   SlidingGram gram_;
 };
 

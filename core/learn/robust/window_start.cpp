@@ -36,6 +36,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   GridFrames& here = looks.median;
   WindowLight light = light_of(frames, m, context_.room.pool, &here);
   gains_ = std::move(light.gains);
+  for (Gain& gain : gains_) gain = context_.of_format(gain);
   clips_ = light.clips;
   if (clips_ && known.earlier->known()) take_unit_of(known.earlier->cells(), &here);
 
@@ -47,9 +48,10 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
     for (size_t i = 0; i < context_.room.pool->threads(); ++i) scratch.emplace_back(cells);
     context_.room.pool->run(static_cast<size_t>(old), [&](size_t i, size_t worker) {
       const int k = static_cast<int>(i);
-      looks.pictures[i] = {{memory.plane(k, 0), memory.plane(k, 1), memory.plane(k, 2)},
-                           light_over(memory.cells(), memory.slot(k), here, 0, &scratch[worker]),
-                           memory.shape()};
+      looks.pictures[i] = {
+          {memory.plane(k, 0), memory.plane(k, 1), memory.plane(k, 2)},
+          context_.of_format(light_over(memory.cells(), memory.slot(k), here, 0, &scratch[worker])),
+          memory.shape()};
     });
     for (int k = 0; k < old; ++k) {
       clips_ |= at_end(memory.cells(), memory.slot(k), looks.pictures[static_cast<size_t>(k)].gain);
@@ -69,7 +71,8 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   if (!known.earlier->known()) return looks;
   LightScratch scratch(cells);
   const GridFrames& earlier = known.earlier->cells();
-  looks.pictures.push_back(known.earlier->picture(light_over(earlier, 0, here, 0, &scratch)));
+  looks.pictures.push_back(
+      known.earlier->picture(context_.of_format(light_over(earlier, 0, here, 0, &scratch))));
   looks.cells.push_back(earlier.plane(0, 0));
   looks.recollection = known.earlier->recollection(context_.parameters.earlier_share *
                                                    static_cast<float>(looks.count));
@@ -83,7 +86,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
 void WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
   const size_t cells = context_.grid.cells();
   LightScratch scratch(cells);
-  const Gain gain = light_over(earlier, 0, *here, 0, &scratch);
+  const Gain gain = context_.of_format(light_over(earlier, 0, *here, 0, &scratch));
   const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
   for (size_t c = 0; c < kChannels; ++c) {
     const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
@@ -222,7 +225,7 @@ void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earli
   for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
   std::vector<uint8_t> spread(context_.pixels());
   median_picture(context_.grid, context_.band, stable_, looks.pictures, context_.room.pool,
-                 background, spread.data());
+                 background, spread.data(), context_.range());
   recall_spread(earlier, &spread);
   blur(spread.data(), reference_.width, reference_.height, context_.room.pool, spread_.data());
   const RobustParameters& parameters = context_.parameters;
