@@ -185,7 +185,7 @@ def run_demo(folder):
 
 
 def messages_as_documented(folder):
-    page = (root / 'docs' / 'element.md').read_text()
+    page = (root / 'docs' / 'messages.md').read_text()
     table = page.split('\n## Messages\n')[1].split('\n## ')[0]
     documented = {name: kind for names, kind in re.findall(r'^\| (`.*`) \| (\w+)', table, re.M)
                   for name in re.findall('`(.*?)`', names)}
