@@ -15,7 +15,7 @@ def rows(name, marker):
 
 
 stream = rows('robust.md', 'stream')
-steps = rows('masks.md', 'steps')
+steps = rows('notebook/masks.md', 'steps')
 speed = rows('performance.md', 'speed')
 
 

@@ -239,8 +239,8 @@ QDMD_STEP float kCalmMean = step("pace.calm_mean", 3.0f), kCalmCell = step("pace
 QDMD_STEP float kMostMoved = step("pace.most_moved", 0.1f);
 // Hops that are left out between two solves, at most.
 QDMD_STEP int kMostCalm = step("pace.most_calm", 3);
-// Sampled pixels along the short side that are chosen: more move no background (docs/notebook/robust.md).
-// The coarsest step leaves half of them.
+// Sampled pixels along the short side that are chosen: more move no background
+// (docs/notebook/robust.md). The coarsest step leaves half of them.
 QDMD_STEP double kSamplesAlong = step("pace.samples_along", 60.0);
 QDMD_STEP size_t kFewestSamples = step("pace.fewest_samples", size_t{28});
 }  // namespace pace
