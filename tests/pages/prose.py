@@ -16,7 +16,7 @@ def paragraphs(text):
     """Runs of prose: paragraphs, items of lists, headings and cells of tables. Formulas, which are indented, are none."""
     text = re.sub(r'<!--.*?-->', '', without_code(text), flags=re.S)
     text = LINK.sub(lambda link: link[2], text)
-    text = re.sub(r'``.*?``|`[^`]*`', 'code', text)
+    text = re.sub(r'``.*?``|`[^`]*`', 'code', text).replace('<br>', '|')
     current = []
     for line in [*text.splitlines(), '']:
         begins = re.match(r' *(?:[-*] |\d+\. |#|\|)', line)
