@@ -563,7 +563,7 @@ static void gst_qdmd_scene_src_finalize(GObject* object) {
 static std::string scene_blurb() {
   std::string text = "A preset, or effects such as noise=3,jitter=1.5:frequency=2. Presets:";
   for (const auto& preset : presets()) text.append(" ").append(preset.name);
-  text.append("; effects, each of them a preset too:");
+  text.append(". Effects, each of them a preset too:");
   for (const EffectInfo* info : effects()) text.append(" ").append(info->name);
   return text;
 }
@@ -602,12 +602,12 @@ static void gst_qdmd_scene_src_class_init(GstQdmdSceneSrcClass* klass) {
                         gst_qdmd_scene_src_truth_get_type(), TRUTH_NONE, ready));
   g_object_class_install_property(
       object_class, PROP_POST_MESSAGES,
-      g_param_spec_boolean("post-messages", "Post messages",
-                           "Post an element message `qdmdscenesrc-camera` for each frame: its "
-                           "timestamp, and where the camera looks beside its place, camera-x and "
-                           "camera-y in pixels to the right and down and camera-angle in degrees "
-                           "clockwise",
-                           FALSE, ready));
+      g_param_spec_boolean(
+          "post-messages", "Post messages",
+          "Post an element message `qdmdscenesrc-camera` for each frame: its timestamp, and where "
+          "the camera looks beside its place. camera-x and camera-y are in pixels to the right and "
+          "down, camera-angle in degrees clockwise",
+          FALSE, ready));
   g_object_class_install_property(
       object_class, PROP_IS_LIVE,
       g_param_spec_boolean("is-live", "Is live",
