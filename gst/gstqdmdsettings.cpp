@@ -140,8 +140,8 @@ const Property kProperties[] = {
        return g_param_spec_double(
            "foreground-threshold", "Foreground threshold",
            "A pixel is foreground if it is farther than this from the background: the length of "
-           "the RGB difference in grey levels (0: from the noise of the window, for robust of each "
-           "pixel, at least 18)",
+           "the RGB difference in grey levels. 0: from the noise of the window, for robust of each "
+           "pixel, at least 18",
            0, 442, d.wishes.foreground_threshold, kControllable);
      },
      QDMD_DOUBLE(s.wishes.foreground_threshold)},

@@ -55,7 +55,7 @@ def anchors(text):
 def dead_links(path):
     """Links of a page to files, or to headings, that are not there. Addresses of the web are taken as they are."""
     text = path.read_text(encoding='utf-8')
-    for _, _, target in LINK.findall(without_code(text)):
+    for _, _, target in LINK.findall(re.sub(r'`[^`\n]*`', '', without_code(text))):
         if re.match(r'\w+:', target):
             continue
         name, _, anchor = urllib.parse.unquote(target).partition('#')
