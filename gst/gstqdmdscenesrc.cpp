@@ -5,10 +5,10 @@
  *
  * qdmdscenesrc makes video of a street in which a person walks by, and whatever effects its
  * properties name: noise, a shaking camera, changing light, waving leaves, bags that are left. With
- * #GstQdmdSceneSrc:truth it sends what is true of the same frames instead: the background as the
- * camera would see it without anybody (before weather, noise and compression), or the mask of what
- * does not belong to it, with shadows and edges marked apart as `labels`. Sources of one seed, one
- * scene and one frame rate are in step.
+ * #GstQdmdSceneSrc:truth it sends what is true of the same frames instead. `background` is what the
+ * camera would see without anybody, before weather, noise and compression. `mask` is what does not
+ * belong to it, and `labels` also mark shadows and edges. Sources of one seed, one scene and one
+ * frame rate are in step.
  *
  * A frame follows from its number, the seed and the scene alone: seeking to it gives what playing
  * up to it gives. Effects that are not named cost nothing.
