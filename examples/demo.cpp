@@ -35,7 +35,7 @@ struct Options {
   std::string video;
 };
 
-constexpr const char* kTitles[] = {"input", "background", "foreground", "mask"};
+constexpr const char* kTitles[] = {"input", "background", "foreground, 4 times as bright", "mask"};
 constexpr int kSheetRows = 5;
 
 std::atomic<bool> interrupted = false;
@@ -89,9 +89,10 @@ bool parse(int argc, char** argv, Options* options) {
 std::string pipeline_text(const Options& options) {
   const std::string short_queue = " ! queue max-size-buffers=8 max-size-bytes=0 max-size-time=0 ";
   std::string labels;
-  for (const char* title : kTitles)
-    labels += std::string(" ! textoverlay shaded-background=true font-desc=\"Sans 10\" text=") +
-              title + " name=label-" + title + " halignment=left valignment=top xpad=0 ypad=0";
+  for (int i = 0; i < 4; ++i)
+    labels += std::string(" ! textoverlay shaded-background=true font-desc=\"Sans 10\" text=\"") +
+              kTitles[i] + "\" name=label-" + std::to_string(i) +
+              " halignment=left valignment=top xpad=0 ypad=0";
   std::string text = options.scene.empty() ? "filesrc name=file ! decodebin ! "
                                            : "qdmdscenesrc name=scene num-buffers=300 ! "
                                              "video/x-raw,width=320,height=240,framerate=25/1 ! ";
@@ -105,7 +106,10 @@ std::string pipeline_text(const Options& options) {
       std::to_string(options.window_size) + " s.background ! tee name=b b." + short_queue +
       "! grid.sink_1 b." + short_queue +
       "! appsink name=background sync=false async=false max-buffers=1 drop=true wait-on-eos=false ";
-  text += "s.foreground" + short_queue + "! grid.sink_2 ";
+  // People in clothes of the street's grey differ from it by few levels: 2 x 2 times as bright they
+  // are seen.
+  const std::string twice = "! videobalance contrast=2 saturation=2 ";
+  text += "s.foreground" + short_queue + twice + twice + "! grid.sink_2 ";
   text += "s.mask" + short_queue + "! grid.sink_3 ";
   text += "compositor name=grid background=black ! video/x-raw,format=RGBx ! tee name=g g." +
           short_queue + "! appsink name=grids sync=false async=false max-buffers=8 g." +
@@ -131,7 +135,7 @@ void place_pictures(const Entry& entry, const GstVideoInfo& video) {
         gst_element_get_static_pad(entry.grid, ("sink_" + std::to_string(i)).c_str()));
     g_object_set(pad.get(), "xpos", x, "ypos", y, nullptr);
     const Ref<GstElement> label(
-        gst_bin_get_by_name(entry.pipeline, (std::string("label-") + kTitles[i]).c_str()));
+        gst_bin_get_by_name(entry.pipeline, ("label-" + std::to_string(i)).c_str()));
     g_object_set(label.get(), "deltax", x, "deltay", y, nullptr);
   }
 }

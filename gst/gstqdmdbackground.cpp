@@ -7,11 +7,11 @@
  * the background, the foreground, a mask or a cut-out. Each output buffer has its own frame's
  * timestamps, flags and metadata; as many buffers come out as went in.
  *
- * By default (#GstQdmdBackground:method `robust`) what moves is found and taken out first, so that
- * the background has no ghosts; then the quaternion dynamic mode decomposition (Q-DMD: each pixel
- * is one pure quaternion R i + G j + B k, so the colour channels stay coupled) of what is left
- * gives the mode that does not change in time. With `qdmd`, the paper's method, the decomposition
- * is of the frames as they come; `dmd` decomposes each channel by itself.
+ * By default (#GstQdmdBackground:method `robust`) it finds what moves and takes it out first, so
+ * that the background has no ghosts. The quaternion dynamic mode decomposition (Q-DMD) of what is
+ * left gives the mode that does not change in time. Each pixel is one pure quaternion R i + G j +
+ * B k, so the colour channels stay coupled. With `qdmd`, the paper's method, the decomposition is
+ * of the frames as they come; `dmd` decomposes each channel by itself.
  *
  * In #GstQdmdBackground:mode `batch` a frame waits for the last one of its window and for what a
  * solve takes; then one leaves for each that comes. The element reports that latency. Keep audio in

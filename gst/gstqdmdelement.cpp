@@ -45,12 +45,11 @@ void set_load_location(GObject* object, const GValue* value) {
 // Without locks.
 void warn_of_rectangles(GstElement* self, guint left_out) {
   if (left_out > 0)
-    GST_ELEMENT_WARNING(
-        self, LIBRARY, SETTINGS,
-        ("ignore leaves out %u rectangles: each has four whole numbers, x, y, width and "
-         "height, the last two above 0, and there are at most %u.",
-         left_out, guint(IgnoredAreas::kMost)),
-        (nullptr));
+    GST_ELEMENT_WARNING(self, LIBRARY, SETTINGS,
+                        ("ignore leaves out %u rectangles. Each must have four whole numbers, x, "
+                         "y, width and height, the last two above 0. There can be %u at most.",
+                         left_out, guint(IgnoredAreas::kMost)),
+                        (nullptr));
 }
 
 void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
@@ -136,13 +135,12 @@ void install_properties_and_signals(GObjectClass* klass, WhichSettings which) {
       klass, kStatsProperty,
       g_param_spec_boxed(
           "stats", "Statistics",
-          "Counters, and facts about the newest solve: rank, lambda (real and "
-          "imaginary part), omega in rad/frame, residual, condition, "
-          "rounding-bound and sensitivity in levels, solver and estimator (that gave "
-          "the result), "
-          "foreground-ratio (0 to 1), gram-time and solve-time in seconds, and "
-          "what it was given: sample-step, iterations, solve-period (of so many "
-          "windows or hops one is solved); time-per-frame (ms), as learnt",
+          "Counters, and facts about the newest solve. What it found: rank, lambda (real and "
+          "imaginary part), omega in rad/frame, residual, condition, foreground-ratio (0 to 1). "
+          "How sure it is: rounding-bound and sensitivity in levels, and the solver and estimator "
+          "that gave the result. What it took: gram-time and solve-time in seconds. What it was "
+          "given: sample-step, iterations, solve-period (one of so many windows or hops is "
+          "solved). time-per-frame (ms) is as learnt",
           GST_TYPE_STRUCTURE, GParamFlags(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   g_object_class_install_property(
       klass, kBackgroundProperty,

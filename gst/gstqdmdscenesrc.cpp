@@ -5,10 +5,10 @@
  *
  * qdmdscenesrc makes video of a street in which a person walks by, and whatever effects its
  * properties name: noise, a shaking camera, changing light, waving leaves, bags that are left. With
- * #GstQdmdSceneSrc:truth it sends what is true of the same frames instead: the background as the
- * camera would see it without anybody (before weather, noise and compression), or the mask of what
- * does not belong to it, with shadows and edges marked apart as `labels`. Sources of one seed, one
- * scene and one frame rate are in step.
+ * #GstQdmdSceneSrc:truth it sends what is true of the same frames instead. `background` is what the
+ * camera would see without anybody, before weather, noise and compression. `mask` is what does not
+ * belong to it, and `labels` also mark shadows and edges. Sources of one seed, one scene and one
+ * frame rate are in step.
  *
  * A frame follows from its number, the seed and the scene alone: seeking to it gives what playing
  * up to it gives. Effects that are not named cost nothing.
@@ -563,7 +563,7 @@ static void gst_qdmd_scene_src_finalize(GObject* object) {
 static std::string scene_blurb() {
   std::string text = "A preset, or effects such as noise=3,jitter=1.5:frequency=2. Presets:";
   for (const auto& preset : presets()) text.append(" ").append(preset.name);
-  text.append("; effects, each of them a preset too:");
+  text.append(". Effects, each of them a preset too:");
   for (const EffectInfo* info : effects()) text.append(" ").append(info->name);
   return text;
 }
@@ -602,12 +602,12 @@ static void gst_qdmd_scene_src_class_init(GstQdmdSceneSrcClass* klass) {
                         gst_qdmd_scene_src_truth_get_type(), TRUTH_NONE, ready));
   g_object_class_install_property(
       object_class, PROP_POST_MESSAGES,
-      g_param_spec_boolean("post-messages", "Post messages",
-                           "Post an element message `qdmdscenesrc-camera` for each frame: its "
-                           "timestamp, and where the camera looks beside its place, camera-x and "
-                           "camera-y in pixels to the right and down and camera-angle in degrees "
-                           "clockwise",
-                           FALSE, ready));
+      g_param_spec_boolean(
+          "post-messages", "Post messages",
+          "Post an element message `qdmdscenesrc-camera` for each frame: its timestamp, and where "
+          "the camera looks beside its place. camera-x and camera-y are in pixels to the right and "
+          "down, camera-angle in degrees clockwise",
+          FALSE, ready));
   g_object_class_install_property(
       object_class, PROP_IS_LIVE,
       g_param_spec_boolean("is-live", "Is live",

@@ -50,20 +50,19 @@ const Property kProperties[] = {
      QDMD_ENUM(s.engine.mode)},
     {[](const Settings& d) {
        return g_param_spec_uint("window-size", "Window size",
-                                "Frames that are decomposed together; more frames separate slow "
-                                "movers better and cost memory (3 bytes per pixel and frame, 1.5 "
+                                "Frames that are decomposed together. More frames separate slow "
+                                "movers better. They cost memory (3 bytes per pixel and frame, 1.5 "
                                 "in 4:2:0), time and, in mode=batch, latency",
                                 guint(EngineOptions::kMinWindow), guint(EngineOptions::kMaxWindow),
                                 guint(d.engine.window_size), kAtStart);
      },
      QDMD_UINT(s.engine.window_size)},
     {[](const Settings& d) {
-       return g_param_spec_uint("hop-size", "Hop size",
-                                "Frames between solves in mode=live, at most window-size (0: a "
-                                "quarter of it). As long as the background stays as it is, "
-                                "method=robust solves one time in four at least",
-                                0, guint(EngineOptions::kMaxWindow), guint(d.engine.hop_size),
-                                kAtStart);
+       return g_param_spec_uint(
+           "hop-size", "Hop size",
+           "Frames between solves in mode=live, at most window-size (0: a quarter of it). While "
+           "the background does not change, method=robust leaves out up to three of four solves",
+           0, guint(EngineOptions::kMaxWindow), guint(d.engine.hop_size), kAtStart);
      },
      QDMD_UINT(s.engine.hop_size)},
     {[](const Settings& d) {
@@ -108,9 +107,8 @@ const Property kProperties[] = {
     {[](const Settings& d) {
        return g_param_spec_enum(
            "estimator", "Estimator",
-           "How eigenvalues are estimated from frames with noise, for method=qdmd and robust; "
-           "forward-backward and total take rank=0 for 1, since at full rank they change nothing "
-           "(not used by method=dmd)",
+           "How eigenvalues are estimated from frames with noise (not used by method=dmd). "
+           "forward-backward and total take rank=0 for 1, since at full rank they change nothing",
            gst_qdmd_background_estimator_get_type(), gint(d.engine.dmd.estimator), kAtStart);
      },
      QDMD_ENUM(s.engine.dmd.estimator)},
@@ -118,17 +116,16 @@ const Property kProperties[] = {
        return g_param_spec_boolean(
            "spectrum", "Spectrum",
            "Messages and stats have all eigenvalues of a solve, their amplitudes and which are "
-           "background; costs a decomposition with all modes (not used by method=dmd)",
+           "background. It costs a decomposition with all modes (not used by method=dmd)",
            d.engine.dmd.spectrum, kAtStart);
      },
      QDMD_BOOLEAN(s.engine.dmd.spectrum)},
     {[](const Settings& d) {
-       return g_param_spec_uint("sample-step", "Sample step",
-                                "The decomposition sees every k-th pixel in x and y; the output "
-                                "stays full size (0: all pixels for qdmd and dmd, about 60 along "
-                                "the short side for robust)",
-                                0, guint(EngineOptions::kMaxSampleStep),
-                                guint(d.engine.sample_step), kAtStart);
+       return g_param_spec_uint(
+           "sample-step", "Sample step",
+           "The decomposition sees every k-th pixel in x and y, and the output stays full size (0: "
+           "all pixels for qdmd and dmd, about 60 along the short side for robust)",
+           0, guint(EngineOptions::kMaxSampleStep), guint(d.engine.sample_step), kAtStart);
      },
      QDMD_UINT(s.engine.sample_step)},
     {[](const Settings& d) {
@@ -140,11 +137,12 @@ const Property kProperties[] = {
      },
      QDMD_UINT(s.engine.iterations)},
     {[](const Settings& d) {
-       return g_param_spec_double("foreground-threshold", "Foreground threshold",
-                                  "Distance from the background, the length of the RGB difference "
-                                  "in grey levels, above which a pixel is foreground (0: from the "
-                                  "noise of the window, for robust of each pixel, at least 18)",
-                                  0, 442, d.wishes.foreground_threshold, kControllable);
+       return g_param_spec_double(
+           "foreground-threshold", "Foreground threshold",
+           "A pixel is foreground if it is farther than this from the background: the length of "
+           "the RGB difference in grey levels. 0: from the noise of the window, for robust of each "
+           "pixel, at least 18",
+           0, 442, d.wishes.foreground_threshold, kControllable);
      },
      QDMD_DOUBLE(s.wishes.foreground_threshold)},
     {[](const Settings& d) {
@@ -194,11 +192,11 @@ const Property kProperties[] = {
      },
      QDMD_UINT(s.regions_min_area)},
     {[](const Settings& d) {
-       return g_param_spec_double("time-budget", "Time budget",
-                                  "Milliseconds that a frame may take on average (0: no limit); "
-                                  "at most the samples of `sample-step` are then used, and solves "
-                                  "are as rare as needed",
-                                  0, 1e6, d.time_budget, kAnyTime);
+       return g_param_spec_double(
+           "time-budget", "Time budget",
+           "Milliseconds that a frame may take on average (0: no limit). If more would be needed, "
+           "the element solves more rarely, and method=robust looks at fewer samples",
+           0, 1e6, d.time_budget, kAnyTime);
      },
      QDMD_DOUBLE(s.time_budget)},
     {[](const Settings& d) {
@@ -212,11 +210,9 @@ const Property kProperties[] = {
      },
      QDMD_DOUBLE(s.absorb_time)},
     {[](const Settings& d) {
-       return g_param_spec_enum("shadows", "Shadows",
-                                "What masks make of the background in another light: shadows, and "
-                                "floors that mirror",
-                                gst_qdmd_background_shadows_get_type(), gint(d.wishes.shadows),
-                                kControllable);
+       return g_param_spec_enum(
+           "shadows", "Shadows", "What shadows, and mirror images on floors, are in masks",
+           gst_qdmd_background_shadows_get_type(), gint(d.wishes.shadows), kControllable);
      },
      QDMD_ENUM(s.wishes.shadows)},
     {[](const Settings& d) {
@@ -232,7 +228,7 @@ const Property kProperties[] = {
        return areas_spec("ignore", "Ignore",
                          "Rectangles `<<x,y,width,height>,...>` in pixels, 64 at most, in which "
                          "nothing is foreground and masks learn nothing. What reaches beyond the "
-                         "picture is cut off; rectangles without a pixel are left out",
+                         "picture is cut off, and rectangles without a pixel are left out",
                          kAnyTime);
      },
      [](Settings& s, const GValue* v) {
@@ -256,13 +252,12 @@ const Property kProperties[] = {
        g_value_set_static_string(v, g_quark_to_string(s.ignored_type));
      }},
     {[](const Settings& d) {
-       return g_param_spec_enum(
-           "stabilize", "Stabilize",
-           "How a camera that shakes or drifts may move. Frames are moved back to the camera's "
-           "first "
-           "place, by up to an eighth of the picture; masks and backgrounds are sent as the camera "
-           "sees them",
-           gst_qdmd_background_stabilize_get_type(), gint(d.engine.stabilize), kAtStart);
+       return g_param_spec_enum("stabilize", "Stabilize",
+                                "How a camera that shakes or drifts may move. Frames are moved "
+                                "back to the camera's first place, by up to an eighth of the "
+                                "picture. Masks and backgrounds are sent as the camera sees them",
+                                gst_qdmd_background_stabilize_get_type(), gint(d.engine.stabilize),
+                                kAtStart);
      },
      QDMD_ENUM(s.engine.stabilize)},
     {[](const Settings& d) {
@@ -289,37 +284,37 @@ const Property kProperties[] = {
      QDMD_BOOLEAN(s.object_snapshots)},
     {[](const Settings& d) {
        return g_param_spec_double("object-min-size", "Least size of objects",
-                                  "Longer side of the box of an object, in parts of the picture's "
-                                  "height: what is smaller is told of by no message",
+                                  "Least length of the longer side of an object's box, in parts of "
+                                  "the picture's height. Smaller things have no messages",
                                   0, 1, d.object_min_size, kAnyTime);
      },
      QDMD_DOUBLE(s.object_min_size)},
     {[](const Settings& d) {
        return g_param_spec_double("object-appear-time", "Time in which objects appear",
-                                  "Seconds for which something is seen before it is told that it "
-                                  "appeared, three frames at least",
+                                  "Seconds for which something must be seen before a message says "
+                                  "that it appeared, three frames at least",
                                   0, 1e6, d.object_appear_time, kAnyTime);
      },
      QDMD_DOUBLE(s.object_appear_time)},
     {[](const Settings& d) {
        return g_param_spec_double("object-stop-time", "Time in which objects stop",
-                                  "Seconds for which an object stands before it is told that it "
-                                  "stopped or was left behind, three frames at least",
+                                  "Seconds for which an object must stand before a message says "
+                                  "that it stopped or was left behind, three frames at least",
                                   0, 1e6, d.object_stop_time, kAnyTime);
      },
      QDMD_DOUBLE(s.object_stop_time)},
     {[](const Settings& d) {
        return g_param_spec_double("object-gone-time", "Time after which objects are gone",
-                                  "Seconds for which no frame shows an object before it is told "
-                                  "that it is gone, three frames at least",
+                                  "Seconds without a frame that shows an object until a message "
+                                  "says that it is gone, three frames at least",
                                   0, 1e6, d.object_gone_time, kAnyTime);
      },
      QDMD_DOUBLE(s.object_gone_time)},
     {[](const Settings& d) {
-       return g_param_spec_double("motion-end-time", "Time after which motion ends",
-                                  "Seconds for which nothing moves in the picture before it is "
-                                  "told that motion ends",
-                                  0, 1e6, d.motion_end_time, kAnyTime);
+       return g_param_spec_double(
+           "motion-end-time", "Time after which motion ends",
+           "Seconds in which nothing moves in the picture until a message says that motion ends", 0,
+           1e6, d.motion_end_time, kAnyTime);
      },
      QDMD_DOUBLE(s.motion_end_time)},
 };

@@ -1,5 +1,5 @@
 // The steps of a decision, and the constants that they go by. Users have no say in either:
-// docs/masks.md has what each step is worth, and what other constants would give.
+// docs/notebook/masks.md has what each step is worth, and what other constants would give.
 #pragma once
 
 #include "core/passes/shading.h"

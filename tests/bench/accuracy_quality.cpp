@@ -90,7 +90,8 @@ std::vector<size_t> spread_frames(size_t count) {
 }
 
 // One truth is that of one light: where it does not vary, backgrounds are scored in the middle of
-// each window, as in docs/robust.md, because those of other times may rightly have another light.
+// each window, as in docs/notebook/robust.md, because those of other times may rightly have another
+// light.
 std::vector<size_t> scored_frames(const TrueClip& clip, int window) {
   const size_t count = clip.frames.size();
   if (clip.truths.size() > 1) return spread_frames(count);

@@ -1,5 +1,5 @@
 // The small problem after the Gram matrix: time against the number of frames, part by part and
-// solver by solver. Names and the argument m go into docs/numerics.md.
+// solver by solver. Names and the argument m go into docs/notebook/numerics.md.
 #include <benchmark/benchmark.h>
 
 #include <map>

@@ -1,4 +1,4 @@
-// What other constants of a decision would give: the plateaus of docs/masks.md.
+// What other constants of a decision would give: the plateaus of docs/notebook/masks.md.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>

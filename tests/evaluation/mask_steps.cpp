@@ -1,4 +1,5 @@
-// What each step of a mask brings, beside OpenCV's masks: the measurement of docs/masks.md.
+// What each step of a mask brings, beside OpenCV's masks: the measurement of
+// docs/notebook/masks.md.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>

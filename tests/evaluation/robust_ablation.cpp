@@ -1,4 +1,5 @@
-// What each setting and each constant of robust Q-DMD brings: the measurement of docs/robust.md.
+// What each setting and each constant of robust Q-DMD brings: the measurement of
+// docs/notebook/robust.md.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>

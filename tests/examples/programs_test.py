@@ -170,6 +170,18 @@ def record_nothing(folder):
     assert not (folder / 'nothing.mkv').exists()
 
 
+def readme_gives_frames_and_masks(folder):
+    """The program of README.md, which reads street.avi; then what it holds at the end."""
+    program, = re.findall(r'^```python\n(.*?)^```', (root / 'README.md').read_text(), re.M | re.S)
+    (folder / 'street.avi').write_bytes((folder / 'film.avi').read_bytes())
+    seen = '    print(frame.shape, mask.shape, len(people) == (mask > 0).sum(), mask.mean())\n'
+    said, _ = run(folder, sys.executable, '-c', program + seen)
+    lines = said.splitlines()
+    assert len(lines) == common.FILM_FRAMES, said
+    assert all(line.startswith(f'({HEIGHT}, {4 * WIDTH}) ({HEIGHT}, {WIDTH}) True') for line in lines), said
+    assert sum(float(line.split()[-1]) > 0 for line in lines) > common.FILM_FRAMES / 2, said
+
+
 def record_errors(folder):
     run(folder, examples / 'record.py', '--help')
     _, errors = run(folder, examples / 'record.py', 'v4l2src device=/dev/no-such-camera', expect=1)
@@ -185,7 +197,7 @@ def run_demo(folder):
 
 
 def messages_as_documented(folder):
-    page = (root / 'docs' / 'element.md').read_text()
+    page = (root / 'docs' / 'messages.md').read_text()
     table = page.split('\n## Messages\n')[1].split('\n## ')[0]
     documented = {name: kind for names, kind in re.findall(r'^\| (`.*`) \| (\w+)', table, re.M)
                   for name in re.findall('`(.*?)`', names)}
@@ -210,7 +222,7 @@ def messages_as_documented(folder):
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
               watch_errors, record_events, record_motion, record_nothing, record_errors, messages_as_documented,
-              two_pads_simulated, two_pads_film, run_demo]
+              readme_gives_frames_and_masks,              two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         common.make_film(folder / 'film.avi')

@@ -1,21 +1,21 @@
 #!/usr/bin/env bash
-# Puts the tables and plots of docs/accuracy-vs-time.md anew, in less than half an hour on two idle
-# cores. Real sequences need QDMD_DATA, the folder that has SBI, SBMnet and CDnet; without it there
+# Puts the tables and plots of docs/accuracy-vs-time.md and its notebook anew, in less than half an hour on two
+# idle cores. Real sequences need QDMD_DATA, the folder that has SBI, SBMnet and CDnet; without it there
 # are simulated scenes alone. The table stays in build/accuracy.
 #
 #   tests/pages/accuracy.sh [--resume | --short | --page]
 #
 # --resume: what is in the table is not measured again. --short: a minute, to try the script, whose
-# page is build/accuracy/short/page.md. --page: from the table of last time.
+# pages are build/accuracy/short/{page,notebook}.md. --page: from the table of last time.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 
 form=${1:-whole}
-page=docs/accuracy-vs-time.md plots=docs/images/accuracy options=()
+page=docs/accuracy-vs-time.md notebook=docs/notebook/accuracy-vs-time.md plots=docs/images/accuracy options=()
 case "$form" in
   whole | --resume | --page) ;;
   --short)
-    results=$results/short page=$results/page.md plots=$results options=(--short)
+    results=$results/short page=$results/page.md notebook=$results/notebook.md plots=$results options=(--short)
     ;;
   *) echo "usage: tests/pages/accuracy.sh [--resume | --short | --page]" >&2; exit 2 ;;
 esac
@@ -23,7 +23,10 @@ find_sequences
 
 tests/install-dependencies.sh build test docs
 mkdir -p "$results" "$plots"
-[ "$form" != --short ] || cp docs/accuracy-vs-time.md "$page"
+if [ "$form" = --short ]; then
+  cp docs/accuracy-vs-time.md "$page"
+  cp docs/notebook/accuracy-vs-time.md "$notebook"
+fi
 
 if [ "$form" != --page ]; then
   build tests/bench/accuracy-cost
@@ -38,4 +41,4 @@ if [ "$form" != --page ]; then
   trap - EXIT
 fi
 
-/usr/bin/python3 tests/pages/accuracy_page.py "$page" "$plots" "$results"
+/usr/bin/python3 tests/pages/accuracy_page.py "$page" "$notebook" "$plots" "$results"

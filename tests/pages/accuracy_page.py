@@ -1,7 +1,7 @@
-"""Puts the tables of accuracy-cost between the markers of docs/accuracy-vs-time.md, and draws its
-plots. Says which of the promised growths and errors do not hold.
+"""Puts the tables of accuracy-cost between the markers of docs/accuracy-vs-time.md and its notebook, and draws
+their plots. Says which of the promised growths and errors do not hold.
 
-Usage: accuracy_page.py PAGE PLOT_FOLDER RESULTS
+Usage: accuracy_page.py PAGE NOTEBOOK PLOT_FOLDER RESULTS
 """
 import os
 import sys
@@ -213,14 +213,14 @@ def clips(rows):
 
 
 def main():
-    page, plots, folder = sys.argv[1:]
+    page, notebook, plots, folder = sys.argv[1:]
     rows = results.read(os.path.join(folder, 'table.csv'))
     checks = results.checks(rows)
     quality = Quality(rows)
-    put(page, {
+    put(page, {'wishes': quality.wishes()})
+    put(notebook, {
         'machine': conditions(folder),
         'clips': clips(rows),
-        'wishes': quality.wishes(),
         'front': quality.front(),
         'knobs': quality.knobs(),
         'digits': quality.digits(),

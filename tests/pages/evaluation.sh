@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables and pictures of docs/evaluation.md anew. Needs the sequences: QDMD_DATA names the
+# Puts the tables and pictures of docs/evaluation.md and its notebook anew. Needs the sequences: QDMD_DATA names the
 # folder that has SBI, SBMnet and CDnet. Takes a few minutes; stopped and started again, it goes on
 # where it was. Backgrounds and contact sheets stay in build/evaluation.
 set -euo pipefail
@@ -58,5 +58,5 @@ if [ -n "$video" ]; then
   shrink "$street/out/street_sheet.png" 1200 docs/images/evaluation-street.jpg
 fi
 
-/usr/bin/python3 tests/pages/evaluation_page.py docs/evaluation.md tests/pages/paper-tables.csv \
-  docs/images/evaluation-spread.svg "$results/tables"
+/usr/bin/python3 tests/pages/evaluation_page.py docs/evaluation.md docs/notebook/evaluation.md \
+  tests/pages/paper-tables.csv docs/images/evaluation-spread.svg "$results/tables"

@@ -1,6 +1,6 @@
-"""Puts measured and quoted tables between the markers of docs/evaluation.md, and draws its plot.
+"""Puts measured and quoted tables between the markers of docs/evaluation.md and its notebook, and draws its plot.
 
-Usage: evaluation_page.py PAGE PAPER_CSV PLOT_SVG TABLES
+Usage: evaluation_page.py PAGE NOTEBOOK PAPER_CSV PLOT_SVG TABLES
 """
 import csv
 import glob
@@ -240,14 +240,14 @@ def plot(runs, paper, path):
 
 
 def main():
-    page, paper_csv, plot_svg, folder = sys.argv[1:]
+    page, notebook, paper_csv, plot_svg, folder = sys.argv[1:]
     runs = load(folder)
     with open(paper_csv) as file:
         paper = list(csv.DictReader(file))
-    put(page, {
-        'overview': overview(runs), 'coupling': coupling(runs), 'spread': spread(runs),
-        'pictures': pictures(runs), 'masks': masks(runs), 'paper': beside_paper(runs, paper),
-        'published': published(paper), 'measures': six_measures(runs),
+    put(page, {'overview': overview(runs)})
+    put(notebook, {
+        'coupling': coupling(runs), 'spread': spread(runs), 'pictures': pictures(runs), 'masks': masks(runs),
+        'paper': beside_paper(runs, paper), 'published': published(paper), 'measures': six_measures(runs),
     })
     plot(runs, paper, plot_svg)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables and the plot of the formats into docs/element.md anew. Takes about three minutes.
+# Puts the tables and the plot of the formats into docs/formats.md anew. Takes about three minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 
@@ -10,4 +10,4 @@ build/tests/bench/formats --benchmark_filter=768x576 --benchmark_min_time=0.05 \
   --benchmark_format=json --benchmark_repetitions=5 \
   --benchmark_report_aggregates_only=true >"$results/cost.json" 2>/dev/null
 mkdir -p docs/images/formats
-/usr/bin/python3 tests/pages/formats_page.py docs/element.md "$results" docs/images/formats
+/usr/bin/python3 tests/pages/formats_page.py docs/formats.md "$results" docs/images/formats

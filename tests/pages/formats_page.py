@@ -1,4 +1,4 @@
-"""What formats cost, and what 10 bits are good for: tables and a plot for docs/element.md.
+"""What formats cost, and what 10 bits are good for: tables and a plot for docs/formats.md.
 
 Usage: formats_page.py PAGE RESULTS IMAGES
 """

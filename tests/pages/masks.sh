@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables and pictures of docs/masks.md anew. Needs the sequences: QDMD_DATA names the folder
+# Puts the tables and pictures of docs/masks.md and its notebook anew. Needs the sequences: QDMD_DATA names the folder
 # that has SBI, SBMnet and CDnet; QDMD_MORE one that has `fall` and `pedestrians` of CDnet. Takes about
 # ten minutes.
 set -euo pipefail
@@ -62,6 +62,6 @@ for scene in basic,shadow background-motion basic,night; do
   build/tests/evaluation/qdmd-mask-steps --dataset "$results/scenes/$scene" \
     --sheet "$results/sheet-${scene//,/-}.png" --shown 200
 done
-/usr/bin/python3 tests/pages/masks_page.py docs/masks.md "$results"
+/usr/bin/python3 tests/pages/masks_page.py docs/masks.md docs/notebook/masks.md "$results"
 shrink "$results/scenes.png" 960 docs/images/masks/scenes.jpg
 [ ! -f "$results/soft.png" ] || shrink "$results/soft.png" 1280 docs/images/masks/soft.jpg

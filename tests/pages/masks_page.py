@@ -1,6 +1,6 @@
-"""Puts measured tables between the markers of docs/masks.md, and the scenes' sheets together.
+"""Puts measured tables between the markers of docs/masks.md and its notebook, and the scenes' sheets together.
 
-Usage: masks_page.py PAGE RESULTS
+Usage: masks_page.py PAGE NOTEBOOK RESULTS
 """
 import json
 import os
@@ -71,13 +71,13 @@ def soft(folder, path):
     matplotlib.image.imsave(path, numpy.hstack(pictures))
 
 
-def main(page, results):
+def main(page, notebook, results):
     with open(os.path.join(results, 'steps.md')) as file:
         steps = file.read()
     with open(os.path.join(results, 'constants.md')) as file:
         constants = file.read()
-    put(page, {'steps': steps, 'constants': constants, 'scenes': scenes(os.path.join(results, 'scenes.md')),
-               'cost': cost(os.path.join(results, 'cost.json'))})
+    put(page, {'scenes': scenes(os.path.join(results, 'scenes.md'))})
+    put(notebook, {'steps': steps, 'constants': constants, 'cost': cost(os.path.join(results, 'cost.json'))})
     sheets = [matplotlib.image.imread(os.path.join(results, f'sheet-{name}.png'))
               for name in ('basic-shadow', 'background-motion', 'basic-night')]
     matplotlib.image.imsave(os.path.join(results, 'scenes.png'), numpy.vstack(sheets))

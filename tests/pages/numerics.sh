@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables of docs/numerics.md anew: the hard cases against 50 digits, what noise does to the
+# Puts the tables of docs/notebook/numerics.md anew: the hard cases against 50 digits, what noise does to the
 # estimators, and the times of the small problem. Takes some minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
@@ -11,4 +11,4 @@ build/tests/stability/estimator-table 8 >"$results/estimators.md"
 build/tests/bench/solve --benchmark_repetitions=5 --benchmark_report_aggregates_only=true \
   --benchmark_format=json >"$results/times.json"
 
-/usr/bin/python3 tests/pages/numerics_page.py docs/numerics.md "$results"
+/usr/bin/python3 tests/pages/numerics_page.py docs/notebook/numerics.md "$results"

@@ -1,4 +1,4 @@
-"""Puts the hard cases, the estimators and the times of the small problem into docs/numerics.md.
+"""Puts the hard cases, the estimators and the times of the small problem into docs/notebook/numerics.md.
 
 Usage: numerics_page.py PAGE RESULTS
 """

@@ -10,6 +10,7 @@ import tempfile
 import unittest
 
 import page
+import prose
 
 ROOT = pathlib.Path(sys.argv.pop())
 # Two blocks, text of several bytes a character, line ends of two kinds, none at the end.
@@ -66,10 +67,69 @@ class Markers(unittest.TestCase):
         self.assertEqual((run.returncode, run.stderr), (1, 'usage: page.py PAGE NAME=FILE...\n'))
 
 
+class Prose(unittest.TestCase):
+    def test_sentences(self):
+        text = ('# A heading without an end\n\nOne is here. Two (with 3.5 dots.)\ngoes on `in. code` - here! *Three?*\n'
+                '- an item\n- [a link. Of two](page.md)\n\n```sh\nno. prose.\n```\n| a cell | another. one<br>third |\n|---|---|\n'
+                '\n    a formula. is none\n\n<!-- no. prose -->\nlast')
+        self.assertEqual(list(prose.sentences(text)),
+                         ['A heading without an end', 'One is here.', 'Two (with 3.5 dots.', 'goes on code - here!',
+                          '*Three?', 'an item', 'a link.', 'Of two', 'a cell', 'another.', 'one', 'third',
+                          '---', '---', 'last'])
+        self.assertEqual(len(prose.words('goes on code - here!')), 4)
+
+    def test_anchors(self):
+        self.assertEqual(list(prose.anchors('# The `a-b` of [it](x.md), 1.\n```sh\n# none\n```\n## Twice\n## Twice\n')),
+                         ['the-a-b-of-it-1', 'twice', 'twice-1'])
+
+    def test_dead_links(self):
+        with tempfile.TemporaryDirectory() as folder:
+            page_path = pathlib.Path(folder) / 'page.md'
+            (pathlib.Path(folder) / 'other.md').write_text('# Here\n')
+            page_path.write_text('# Top\n[a](other.md) [b](other.md#here) [c](#top) [d](https://e.org) `[e](none.md)`\n'
+                                 '[f](other.md#there) [g](none.md) ![h](no.jpg) [i](#bottom)\n')
+            self.assertEqual(list(prose.dead_links(page_path)),
+                             ['other.md#there', 'none.md', 'no.jpg', '#bottom'])
+
+
+GUIDES = [ROOT / 'README.md', *sorted(ROOT.glob('docs/*.md')), *sorted(ROOT.glob('examples/*.md'))]
+NOTEBOOK = sorted(ROOT.glob('docs/notebook/*.md'))
+MOST_LINES, MOST_WORDS = 250, 35
+# Lists of names, in what the elements say of themselves, are no sentences.
+LISTS = ('Presets: ', 'Effects, each of them a preset too: ')
+
+
 class Pages(unittest.TestCase):
+    def test_guides_are_short(self):
+        for path in ROOT.glob('docs/*.md'):
+            with self.subTest(path.name):
+                lines = len(path.read_text(encoding='utf-8').splitlines())
+                self.assertLessEqual(lines, MOST_LINES, f'{path}: what was tried belongs into docs/notebook')
+
+    def test_sentences_of_guides_are_short(self):
+        for path in GUIDES:
+            if path.name == 'CHANGELOG.md':
+                continue
+            for sentence in prose.sentences(path.read_text(encoding='utf-8')):
+                with self.subTest(path.name):
+                    if not sentence.startswith(LISTS):
+                        self.assertLessEqual(len(prose.words(sentence)), MOST_WORDS, f'{path}: {sentence}')
+
+    def test_links_lead_somewhere(self):
+        for path in GUIDES + NOTEBOOK:
+            with self.subTest(path.name):
+                self.assertEqual(list(prose.dead_links(path)), [], path)
+
+    def test_each_page_of_the_notebook_has_a_guide_that_leads_to_it(self):
+        self.assertGreater(len(NOTEBOOK), 0)
+        for path in NOTEBOOK:
+            with self.subTest(path.name):
+                guide = (ROOT / 'docs' / path.name).read_text(encoding='utf-8')
+                self.assertIn(f'](notebook/{path.name}', guide)
+
     def test_pages_take_each_of_their_blocks_back(self):
         found = 0
-        for path in sorted(ROOT.glob('docs/*.md')):
+        for path in GUIDES + NOTEBOOK:
             text = path.read_bytes()
             names = re.findall('<!-- (?:end of )?(.*?) -->', text.decode())
             with tempfile.TemporaryDirectory() as folder:
@@ -92,13 +152,8 @@ class Pages(unittest.TestCase):
         self.assertEqual(page.block(ROOT / 'README.md', 'figures'), made.strip(),
                          'run tests/pages/readme.sh')
 
-    def test_readme_is_short_and_its_links_lead_somewhere(self):
-        text = (ROOT / 'README.md').read_text(encoding='utf-8')
-        self.assertLessEqual(len(text.split()), 900)
-        links = re.findall(r'\]\(([^)#:]+)', text)
-        self.assertGreater(len(links), 5)
-        for link in links:
-            self.assertTrue((ROOT / link).exists(), link)
+    def test_readme_is_short(self):
+        self.assertLessEqual(len((ROOT / 'README.md').read_text(encoding='utf-8').split()), 900)
 
 
 unittest.main()

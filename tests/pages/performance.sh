@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Puts the tables and plots of docs/performance.md anew, in a quarter of an hour on an idle
-# machine. What the programs print stays in build/performance.
+# Puts the tables and plots of docs/performance.md and its notebook anew, in a quarter of an hour on an
+# idle machine. What the programs print stays in build/performance.
 #
 #   tests/pages/performance.sh [--short | --page]
 #
@@ -60,4 +60,5 @@ if [ "$form" != --page ]; then
 fi
 
 mkdir -p docs/images/performance
-/usr/bin/python3 tests/pages/performance_page.py docs/performance.md docs/images/performance "$results"
+/usr/bin/python3 tests/pages/performance_page.py docs/performance.md docs/notebook/performance.md \
+  docs/images/performance "$results"

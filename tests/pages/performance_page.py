@@ -1,6 +1,6 @@
-"""Puts measured tables between the markers of docs/performance.md, and draws its plots.
+"""Puts measured tables between the markers of docs/performance.md and its notebook, and draws their plots.
 
-Usage: performance_page.py PAGE PLOT_FOLDER RESULTS
+Usage: performance_page.py PAGE NOTEBOOK PLOT_FOLDER RESULTS
 """
 import json
 import os
@@ -249,9 +249,10 @@ def plot(path, results, cases, horizontal, title, label):
 
 
 def main():
-    page, plots, folder = sys.argv[1:]
+    page, notebook, plots, folder = sys.argv[1:]
     results = Results(folder)
-    put(page, {
+    put(page, {'live': live_table(results), 'outputs': outputs_table(results.outputs)})
+    put(notebook, {
         'machine': machine(folder) + ' A load above what the benchmark itself makes means that '
                    'others used the machine.',
         'promises': promises(results),
@@ -262,8 +263,6 @@ def main():
         'passes': passes_table(results),
         'gram': gram_table(results),
         'adjoint': results.text('adjoint.txt').partition('\n\n')[2],
-        'live': live_table(results),
-        'outputs': outputs_table(results.outputs),
     })
 
     plot(os.path.join(plots, 'size.svg'), results,

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the figures of docs/reliability.md anew, from the logs of runs that took hours:
+# Puts the figures of docs/notebook/reliability.md anew, from the logs of runs that took hours:
 #
 #   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log; those of several
 #                                                         runs may be joined to one
@@ -51,4 +51,4 @@ block mutation build/mutation{,-again,-2,-2-again,-3,-3-again}.log
 block coverage build-coverage/coverage.txt
 names=()
 for name in fuzz random soak mutation coverage; do names+=("$name=$results/$name.md"); done
-/usr/bin/python3 tests/pages/page.py docs/reliability.md "${names[@]}"
+/usr/bin/python3 tests/pages/page.py docs/notebook/reliability.md "${names[@]}"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts the tables and pictures of docs/robust.md anew. Needs the sequences: QDMD_DATA names the
+# Puts the tables of docs/notebook/robust.md, and its pictures, anew. Needs the sequences: QDMD_DATA names the
 # folder that has SBI, SBMnet and CDnet. Takes some twenty minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
@@ -54,4 +54,4 @@ if [ -n "$video" ]; then
   sheet street middle
 fi
 
-/usr/bin/python3 tests/pages/robust_page.py docs/robust.md "$results"
+/usr/bin/python3 tests/pages/robust_page.py docs/notebook/robust.md "$results"

@@ -1,4 +1,4 @@
-"""Puts what was measured of robust Q-DMD into docs/robust.md.
+"""Puts what was measured of robust Q-DMD into docs/notebook/robust.md.
 
 Usage: robust_page.py PAGE RESULTS
 """

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes docs/scenes.md's reference, its pictures (frame, true background and mask by three sources of
-# one seed) and its table of times anew. Takes some minutes.
+# one seed) and the notebook's table of times anew. Takes some minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 
@@ -28,7 +28,7 @@ frame_of() {
 }
 
 mkdir -p docs/images/scenes
-mapfile -t names < <(sed -n 's/^### //p' "$results/reference.md")
+mapfile -t names < <(sed -nE 's/^\| \*\*`([a-z-]+)`.*/\1/p' "$results/reference.md")
 for name in "${names[@]}"; do
   printf '\rpictures: %-24s' "$name" >&2
   effects=
@@ -50,4 +50,4 @@ build/tests/bench/scene --benchmark_repetitions=5 --benchmark_report_aggregates_
   --benchmark_enable_random_interleaving=true --benchmark_min_time=0.05 \
   --benchmark_format=json >"$results/times.json"
 
-/usr/bin/python3 tests/pages/scenes_page.py docs/scenes.md "$results"
+/usr/bin/python3 tests/pages/scenes_page.py docs/scenes.md docs/notebook/scenes.md "$results"

@@ -1,6 +1,6 @@
-"""Puts the reference and the times of scenes into docs/scenes.md.
+"""Puts the reference of scenes into docs/scenes.md, and their times into its notebook.
 
-Usage: scenes_page.py PAGE RESULTS
+Usage: scenes_page.py PAGE NOTEBOOK RESULTS
 """
 import os
 import re
@@ -38,10 +38,11 @@ def times(path, names):
 
 
 def main():
-    page, folder = sys.argv[1:]
+    page, notebook, folder = sys.argv[1:]
     reference = read(os.path.join(folder, 'reference.md'))
-    names = re.findall('^### (.*)$', reference, re.M)
-    put(page, {'reference': reference, 'times': times(os.path.join(folder, 'times.json'), names)})
+    names = re.findall(r'^\| \*\*`([a-z-]+)`', reference, re.M)
+    put(page, {'reference': reference})
+    put(notebook, {'times': times(os.path.join(folder, 'times.json'), names)})
 
 
 main()

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the spectra of docs/algorithm.md: forty frames of a street, at full rank, where one mode is the
+# Draws the spectra of docs/algorithm.md and its notebook: forty frames of a street, at full rank, where one mode is the
 # background, and 150 of Board (SBI), where several share it. A minute.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

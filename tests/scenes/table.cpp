@@ -7,28 +7,34 @@ namespace {
 
 using namespace qdmd::scene;
 
-void print_picture(const char* name) { std::printf("\n![%s](images/scenes/%s.jpg)\n", name, name); }
+// A row's first cell: name, what is to be seen, and the picture of it.
+void begin_row(const char* name, const char* text) {
+  std::printf("| **`%s`**<br>%s.<br>![%s](images/scenes/%s.jpg) | ", name, text, name, name);
+}
 
 void print_effect(const EffectInfo& info) {
-  std::printf("\n### %s\n\n%s.\n\n", info.name, info.description);
-  std::printf("| parameter | unit | default | range | meaning |\n|---|---|---|---|---|\n");
-  for (const Parameter& parameter : info.parameters)
-    std::printf("| `%s` | %s | %g | %g to %g%s | %s |\n", parameter.name, parameter.unit,
-                parameter.standard, parameter.minimum, parameter.maximum,
+  begin_row(info.name, info.description);
+  const char* between = "";
+  for (const Parameter& parameter : info.parameters) {
+    std::printf("%s`%s` %g %s (%g to %g%s): %s", between, parameter.name, parameter.standard,
+                parameter.unit, parameter.minimum, parameter.maximum,
                 parameter.whole ? ", whole" : "", parameter.description);
-  print_picture(info.name);
+    between = "<br>";
+  }
+  std::printf(" |\n");
 }
 
 }  // namespace
 
 int main() {
-  std::printf("## Presets\n");
+  std::printf("## Presets\n\n| preset | its effects |\n|---|---|\n");
   for (const Preset& preset : presets()) {
-    std::printf("\n### %s\n\n%s. Effects: %s.\n", preset.name, preset.intent,
+    begin_row(preset.name, preset.intent);
+    std::printf("%s |\n",
                 *preset.effects ? (std::string("`") + preset.effects + "`").c_str() : "none");
-    print_picture(preset.name);
   }
-  std::printf("\n## Effects\n");
+  std::printf(
+      "\n## Effects\n\n| effect | parameter, default, unit (range): meaning |\n|---|---|\n");
   for (const EffectInfo* info : effects()) print_effect(*info);
   return 0;
 }

@@ -1,5 +1,5 @@
-// estimator-table [SEEDS]: prints the table of docs/numerics.md that shows what noise does to each
-// estimator, against fades whose lambda is known.
+// estimator-table [SEEDS]: prints the table of docs/notebook/numerics.md that shows what noise does
+// to each estimator, against fades whose lambda is known.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

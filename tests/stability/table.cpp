@@ -1,4 +1,4 @@
-// Prints the table of docs/numerics.md: each hard case, each solver, against 50 digits.
+// Prints the table of docs/notebook/numerics.md: each hard case, each solver, against 50 digits.
 #include <cstdio>
 #include <string>
 

@@ -1,5 +1,5 @@
 // The constants that robust Q-DMD learns by, step by step. Users have no say in them:
-// docs/robust.md has what other values would give.
+// docs/notebook/robust.md has what other values would give.
 #pragma once
 
 #include <cstddef>
@@ -201,7 +201,7 @@ namespace scene {
 // one of both has any. A frame is strange where so large a share of the tiles with edges are, if
 // the background has edges in half of them, or one of both in nearly all. Any two of eight recorded
 // clips have 0.81 at least; of one scene, frames that look alike have 0.56 at most for kFrames
-// frames, behind leaves over most of the picture (docs/robust.md).
+// frames, behind leaves over most of the picture (docs/notebook/robust.md).
 QDMD_STEP double kStrangeTile = step("scene.strange_tile", 0.25);
 QDMD_STEP double kStrangeShare = step("scene.strange_share", 0.75);
 // Frames that correlate more than this look alike.
@@ -239,8 +239,8 @@ QDMD_STEP float kCalmMean = step("pace.calm_mean", 3.0f), kCalmCell = step("pace
 QDMD_STEP float kMostMoved = step("pace.most_moved", 0.1f);
 // Hops that are left out between two solves, at most.
 QDMD_STEP int kMostCalm = step("pace.most_calm", 3);
-// Sampled pixels along the short side that are chosen: more move no background (docs/robust.md).
-// The coarsest step leaves half of them.
+// Sampled pixels along the short side that are chosen: more move no background
+// (docs/notebook/robust.md). The coarsest step leaves half of them.
 QDMD_STEP double kSamplesAlong = step("pace.samples_along", 60.0);
 QDMD_STEP size_t kFewestSamples = step("pace.fewest_samples", size_t{28});
 }  // namespace pace
@@ -253,7 +253,7 @@ constexpr int kFrames = 9;
 
 }  // namespace steps
 
-// ---- Spreads, thresholds and weights: what docs/robust.md measures other values of ----
+// ---- Spreads, thresholds and weights: what docs/notebook/robust.md measures other values of ----
 struct RobustParameters {
   int cells_along =
       step("parameters.cells_along", kCellsAlong);  // of the grid, along the short side
