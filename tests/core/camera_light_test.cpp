@@ -89,6 +89,14 @@ TEST(ClippedSamples, WhiteThatStaysIsNoSwing) {
 
 // ---- Y, U and V ----
 
+// R, G and B as Y, U and V of ITU-R BT.601 in 16 .. 235.
+std::array<float, 3> yuv_of(float r, float g, float b) {
+  const float y = 0.299f * r + 0.587f * g + 0.114f * b;
+  return {16 + 219 / 255.0f * y, 128 + 112 / 255.0f / 0.886f * (b - y),
+          128 + 112 / 255.0f / 0.701f * (r - y)};
+}
+constexpr Levels kVideo = {{16, 128, 128}, {235, 128, 128}};
+
 TEST(RgbColours, AreThoseOfTheStandard) {
   const RgbColours video(Colours::yuv, kVideo);
   for (const float r : {0.0f, 40.0f, 255.0f})
@@ -287,14 +295,6 @@ const Camera kCameras[] = {
     {"grey", [](int, float, float luma) { return luma; }, 100},
 };
 
-// R, G and B as Y, U and V of ITU-R BT.601 in 16 .. 235.
-std::array<float, 3> yuv_of(float r, float g, float b) {
-  const float y = 0.299f * r + 0.587f * g + 0.114f * b;
-  return {16 + 219 / 255.0f * y, 128 + 112 / 255.0f / 0.886f * (b - y),
-          128 + 112 / 255.0f / 0.701f * (r - y)};
-}
-constexpr Levels kVideo = {{16, 128, 128}, {235, 128, 128}};
-
 // F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
 // picture.
 std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed) {
@@ -346,14 +346,14 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
 }
 
 class CameraLight : public testing::TestWithParam<std::tuple<Mode, Colours>> {};
+std::string name_of(const testing::TestParamInfo<std::tuple<Mode, Colours>>& of) {
+  return std::string(std::get<Mode>(of.param) == Mode::live ? "Live" : "Batch") +
+         (std::get<Colours>(of.param) == Colours::yuv ? "Yuv" : "Rgb");
+}
 INSTANTIATE_TEST_SUITE_P(Modes, CameraLight,
                          testing::Combine(testing::Values(Mode::batch, Mode::live),
                                           testing::Values(Colours::rgb, Colours::yuv)),
-                         [](const auto& of) {
-                           const auto [mode, colours] = of.param;
-                           return std::string(mode == Mode::live ? "Live" : "Batch") +
-                                  (colours == Colours::yuv ? "Yuv" : "Rgb");
-                         });
+                         name_of);
 
 TEST_P(CameraLight, MasksStayRight) {
   for (const Camera& camera : kCameras)
