@@ -1,5 +1,6 @@
 // What frames put in place of a background's cells between two solves.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -63,14 +64,16 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
 // The background in use may be older than what is known; of a disturbance, it need not be newer.
 void FrameFollower::follow_disturbances(const Cells& frame, const Gain& light, int64_t number) {
   const Cells background = this->background();
-  size_t differing = 0;
-  for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
-    float apart = 0;
-    for (size_t c = 0; c < kChannels; ++c)
-      apart += std::abs(frame.of[c][cell] - std::min(background.of[c][cell] * light[c], 255.0f)) /
-               std::min(light[c], 1.0f);
-    differing += apart > kChannels * steps::contours::kLooksDiffer ? 1 : 0;
-  }
+  std::array<float, kChannels> unit;
+  for (size_t c = 0; c < kChannels; ++c) unit[c] = 1 / std::min(light[c], 1.0f);
+  const auto apart = [&](size_t c, size_t cell) {
+    return unit[c] *
+           std::abs(frame.of[c][cell] - std::min(background.of[c][cell] * light[c], 255.0f));
+  };
+  const float most = kChannels * steps::contours::kLooksDiffer;
+  int differing = 0;
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell)
+    differing += apart(0, cell) + apart(1, cell) + apart(2, cell) > most ? 1 : 0;
   disturbances_.follow(static_cast<double>(differing) / static_cast<double>(context_.grid.cells()),
                        number);
 }
