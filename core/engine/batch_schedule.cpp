@@ -143,7 +143,7 @@ void BatchSchedule::add_group() {
 void BatchSchedule::end_window(bool at_once) {
   Collection window = *std::exchange(collection_, std::nullopt);
   // It may be a disturbance, which the next window will know, if that is long enough.
-  if (window_size_ > steps::scene::kLasts && window.scene && !window.scene_returns && !break_ &&
+  if (window.scene && !window.scene_returns && !break_ &&
       taken() - *window.scene < steps::scene::kLasts)
     scene_from_ = std::exchange(window.scene, std::nullopt);
   if (window.scene && *window.scene < window.begin) window.scene = window.begin;

@@ -251,7 +251,7 @@ std::vector<int> solved_frames(const Clip &clip) {
   return frames;
 }
 
-// A street, and from `comes` on somebody who stands there.
+// A street, and from `comes` on somebody who stands there; no disturbance is so small.
 Clip street_with(size_t comes, size_t count) {
   Clip clip(kWidth * kHeight, count);
   std::mt19937 rng(814);
@@ -260,7 +260,7 @@ Clip street_with(size_t comes, size_t count) {
     clip.frames[t] = street();
     for (size_t i = 0; i < clip.frames[t].size(); ++i) {
       const int p = static_cast<int>(i % clip.pixels), x = p % kWidth, y = p / kWidth;
-      if (t >= comes && x >= 40 && x < 60 && y >= 15 && y < 55)
+      if (t >= comes && x >= 40 && x < 54 && y >= 15 && y < 55)
         clip.frames[t][i] = static_cast<uint8_t>(i < clip.pixels ? 40 : 200);
       clip.frames[t][i] =
           static_cast<uint8_t>(std::clamp(std::lround(clip.frames[t][i] + noise(rng)), 0l, 255l));

@@ -39,6 +39,7 @@ uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
 void FrameFollower::forget() {
   looks_.forget();
   memory_.forget();
+  disturbances_.forget();
   absorbed_.forget();
   uncovered_.forget();
   scene_.forget();
@@ -136,6 +137,7 @@ SceneSeen FrameFollower::colours_of(const Cells& frame) {
 
 void FrameFollower::begin_scene() {
   absorbed_.forget();
+  disturbances_.forget();
   calm_ = 0;
   scene_begins_ = true;
   // Where frames wait, they show the scene before until publish().

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/learn/robust/colour_map.h"
+#include "core/learn/robust/disturbances.h"
 #include "core/learn/robust/exposure_watch.h"
 #include "core/learn/robust/history_starts.h"
 #include "core/learn/robust/learning_steps.h"
@@ -43,7 +44,7 @@ class FrameFollower {
   // True once, when that is over.
   bool has_found_exposure() { return exposure_.has_found(); }
   // Solves are told what is known.
-  void tell(SolveHistory* history) { history->take(&absorbed_, &memory_); }
+  void tell(SolveHistory* history) { history->take(&absorbed_, &memory_, disturbances_); }
   // Learner::enough().
   int enough() const { return 1 + std::min(calm_, steps::pace::kMostCalm); }
 
@@ -88,6 +89,7 @@ class FrameFollower {
   Cells background() const { return {background_cells_, published_}; }
   Cells unclipped_cells(int slot, const Gain& light);
   bool is_calm() const;
+  void follow_disturbances(const Cells& frame, const Gain& light, int64_t number);
   void note_uncovered(const std::vector<int>& cells, const StandingLooks& looks, int64_t number);
   SceneSeen colours_of(const Cells& frame);
   LitFrames lit_frames(const Learner::Compared& frame, const Gain& light,
@@ -107,7 +109,8 @@ class FrameFollower {
   GridFrames unclipped_;  // of a frame
   int published_ = 0;
   LightScratch light_scratch_;
-  SceneMemory memory_;   // what frames that came showed
+  SceneMemory memory_;  // what frames that came showed
+  Disturbances disturbances_;
   StandingLooks looks_;  // what frames showed when they were compared, in batch
   HistoryStarts absorbed_;
   UncoveredPlaces uncovered_;

@@ -195,6 +195,20 @@ QDMD_STEP int64_t kLasts = step("proofs.lasts", int64_t{75});
 QDMD_STEP int64_t kYoungFrames = step("proofs.young_frames", int64_t{200});
 }  // namespace proofs
 
+// ---- Disturbances: what changes most of the picture at once ----
+namespace disturbance {
+// Shares of the picture's cells that do not show the background, beyond the most that frames have
+// shown lately: so many more, and so many more than in the frame before, begin a disturbance, and
+// fewer end it.
+QDMD_STEP double kLeast = step("disturbance.least", 0.1);
+QDMD_STEP double kAtOnce = step("disturbance.at_once", 0.1);
+QDMD_STEP double kOver = step("disturbance.over", 0.06);
+// What a frame counts in that where it shows less.
+QDMD_STEP double kFalls = step("disturbance.falls", 0.01);
+// Frames of a scene before which nobody knows what is usual.
+QDMD_STEP int kKnown = step("disturbance.known", 75);
+}  // namespace disturbance
+
 // ---- Another scene ----
 namespace scene {
 // A tile is strange where its edges correlate less with the background's than this, or where only

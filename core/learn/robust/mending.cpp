@@ -1,5 +1,7 @@
 // What frames put in place of a background's cells between two solves.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "core/learn/robust/frame_follower.h"
@@ -41,6 +43,8 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
     memory_.forget();
   memory_.follow(unclipped_cells(slot, light), light, frame.number);
   if (!model) return;
+  follow_disturbances(Cells(context_.room.frames->cells(), slot), light, frame.number);
+  if (disturbances_.goes_on()) return;
   const Cells background = this->background();
   model->set_time(frame.t);
   const SampleRange range = context_.range();
@@ -57,6 +61,23 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
     std::erase_if(left,
                   [&](int cell) { return memory_.looks().before_stood(cell) >= absorb_frames_; });
   mend_uncovered(std::move(left), memory_.looks(), frame, light, nullptr, model);
+}
+
+// The background in use may be older than what is known; of a disturbance, it need not be newer.
+void FrameFollower::follow_disturbances(const Cells& frame, const Gain& light, int64_t number) {
+  const Cells background = this->background();
+  std::array<float, kChannels> unit;
+  for (size_t c = 0; c < kChannels; ++c) unit[c] = 1 / std::min(light[c], 1.0f);
+  const auto apart = [&](size_t c, size_t cell) {
+    return unit[c] *
+           std::abs(frame.of[c][cell] - std::min(background.of[c][cell] * light[c], 255.0f));
+  };
+  const float most = kChannels * steps::contours::kLooksDiffer;
+  int differing = 0;
+  for (size_t cell = 0; cell < context_.grid.cells(); ++cell)
+    differing += apart(0, cell) + apart(1, cell) + apart(2, cell) > most ? 1 : 0;
+  disturbances_.follow(static_cast<double>(differing) / static_cast<double>(context_.grid.cells()),
+                       number);
 }
 
 // For those who want to be told of it: nothing here depends on it.

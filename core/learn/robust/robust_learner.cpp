@@ -172,7 +172,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
     context_.rgb.convert(cells->cells(), cells->channels(next).data());
     share_cells(context_.grid, context_.band, cells, next);
     model->set_gains(solve_.gains_of_frames(*cells, next));
-    memory_.take(solve_, *cells, next, history_.held());
+    memory_.take(solve_, *cells, next, history_);
     solve_.write_limits(model->make_limits());
   }
   facts_.settled = settled_;

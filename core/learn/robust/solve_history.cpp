@@ -28,10 +28,13 @@ void SolveHistory::forget() {
   absorbed_.forget();
   uncovered_.forget();
   proofs_.any = false;
+  disturbances_.forget();
 }
 
-void SolveHistory::take(HistoryStarts* absorbed, SceneMemory* memory) {
+void SolveHistory::take(HistoryStarts* absorbed, SceneMemory* memory,
+                        const Disturbances& disturbances) {
   absorbed->hand_over(&absorbed_);
+  disturbances_ = disturbances;
   if (!context_.follows(context_.room.models)) return;
   memory->uncovered().hand_over(&uncovered_);
   memory->hand_over(&proofs_);

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/learn/robust/disturbances.h"
 #include "core/learn/robust/robust_context.h"
 #include "core/learn/robust/scene_memory.h"
 
@@ -18,7 +19,7 @@ class SolveHistory {
     return 2 * HistoryStarts::bytes(cells) + Proofs::bytes(cells) + cells;
   }
   void forget();
-  void take(HistoryStarts* absorbed, SceneMemory* memory);
+  void take(HistoryStarts* absorbed, SceneMemory* memory, const Disturbances& disturbances);
 
   // Too little is known of the scene: windows decide alone.
   bool young() const { return proofs_.young; }
@@ -28,6 +29,8 @@ class SolveHistory {
   // By cells, after first_looks(): those that keep the earlier background, if enough frames have
   // shown it.
   const std::vector<uint8_t>& held() const { return held_; }
+  // Frames that say nothing of the background.
+  const Disturbances& disturbances() const { return disturbances_; }
   // Sets the bits of pixels that are known not to show their background in that frame, however
   // little they differ. bits: of the rows that are kept.
   void take_out(int64_t number, uint8_t* bits) const;
@@ -42,6 +45,7 @@ class SolveHistory {
   const RobustContext& context_;
   HistoryStarts absorbed_, uncovered_;
   Proofs proofs_;
+  Disturbances disturbances_;
   std::vector<uint8_t> held_;
   std::vector<KnownForeground> known_foreground_;
 };

@@ -58,21 +58,21 @@ void StreamMemory::see(const SnapshotRange& window) {
 }
 
 void StreamMemory::take(const WindowSolve& solve, const GridFrames& cells, int at,
-                        const std::vector<uint8_t>& held) {
+                        const SolveHistory& history) {
   if (context_.parameters.earlier_share > 0)
     earlier_.take(context_.grid, solve.reference(), solve.spread(), cells, at, solve.stable(),
-                  solve.start_frames(), fresh_, held);
-  keep_some();
+                  solve.start_frames(), fresh_, history.held());
+  keep_some(history.disturbances());
 }
 
 // For windows to come.
-void StreamMemory::keep_some() {
+void StreamMemory::keep_some(const Disturbances& disturbances) {
   const int step =
       steps::memory::kStep * remembered_stride(context_.room.models, context_.room.window_size);
   for (int i = 0; i < window_->size(); ++i) {
     const int64_t number = first_number() + i;
     if (number < stream_from_ || (number - stream_from_) % step != 0) continue;
-    if (number <= frames_.newest()) continue;
+    if (number <= frames_.newest() || disturbances.has(number)) continue;
     frames_.keep(number, *window_, i, context_.room.frames->cells(),
                  int64_t{steps::memory::kWindows} * context_.room.window_size, context_.room.pool);
   }

@@ -29,17 +29,16 @@ class StreamMemory {
   void see(const SnapshotRange& window);
   // The number of its first frame, counted like FrameStore::frames_taken().
   int64_t first_number() const { return static_cast<int64_t>(frames_seen_) - window_->size(); }
-  // After its solve. cells: the background's are picture `at` of them. held: the cells that kept
-  // the earlier background.
-  void take(const WindowSolve& solve, const GridFrames& cells, int at,
-            const std::vector<uint8_t>& held);
+  // After its solve. cells: the background's are picture `at` of them. history: what the solve was
+  // told.
+  void take(const WindowSolve& solve, const GridFrames& cells, int at, const SolveHistory& history);
 
   EarlierWindow* earlier() { return &earlier_; }
   const EarlierWindow& earlier() const { return earlier_; }
   FrameMemory* frames() { return &frames_; }
 
  private:
-  void keep_some();
+  void keep_some(const Disturbances& disturbances);
 
   const RobustContext& context_;
   EarlierWindow earlier_, left_;  // of the scene, and of the one that was left

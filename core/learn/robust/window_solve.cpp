@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numeric>
 
 #include "core/dmd/qdmd.h"
 #include "core/learn/robust/thinning.h"
@@ -125,6 +124,10 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
   const auto scratch =
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * context_.room.pool->threads());
   mask_.find_all(snapshots.size(), context_.room.pool, [&](int t, size_t worker, uint8_t* bits) {
+    if (!std::binary_search(shown_.begin(), shown_.end(), t)) {
+      std::fill_n(bits, mask_bytes(context_.pixels()), uint8_t{255});
+      return;
+    }
     find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
@@ -219,9 +222,8 @@ void WindowSolve::take_reference(BackgroundModel* model, double t) {
 void WindowSolve::refine_light() {
   if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
   const Clock::Span span(*context_.room.clock, Clock::samples);
-  std::vector<int> all(gains_.size());
-  std::iota(all.begin(), all.end(), 0);
-  refine_gains(window_->snapshots, all, &gains_);
+  refine_gains(window_->snapshots, shown_, &gains_);
+  carry_gains();
   if (!clips_) settle_light(&gains_);
 }
 

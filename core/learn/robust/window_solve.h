@@ -77,6 +77,8 @@ class WindowSolve {
   };
   Looks gather(const Known& known);
   void start(const Known& known);
+  void choose_shown(const Known& known, int old);
+  void carry_gains();
   void take_unit_of(const GridFrames& earlier, GridFrames* here);
   void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
   void prefer_darker(const Looks& looks, const GridPictures& chosen);
@@ -113,6 +115,7 @@ class WindowSolve {
   std::vector<uint8_t> spread_, reach_;
   std::vector<uint8_t> brightest_;  // of R, G and B of the background, where samples are others
   std::vector<Gain> gains_;         // of the snapshots
+  std::vector<int> shown_;          // the snapshots that nothing disturbs, in order
   bool clips_ = false;              // WindowLight::clips
   WindowMask mask_;                 // of the snapshots
   Window samples_;                  // filled

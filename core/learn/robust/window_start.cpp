@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <numeric>
 
 #include "core/learn/robust/window_solve.h"
 
@@ -28,19 +29,27 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   const GridFrames& of_frames = context_.room.frames->cells();
   const FrameMemory& memory = *known.memory;
   const int m = snapshots.size();
-  GridPictures frames(cells);
-  frames.reserve(m);
-  for (int t = 0; t < m; ++t) frames.add(of_frames.plane(snapshots.slot(t), 0));
   Looks looks;
   const int old = looks.old = memory.older_than(window_->first);
+  choose_shown(known, old);
+  const int shown = static_cast<int>(shown_.size());
+  GridPictures frames(cells);
+  frames.reserve(shown);
+  for (int t : shown_) frames.add(of_frames.plane(snapshots.slot(t), 0));
   GridFrames& here = looks.median;
-  WindowLight light = light_of(frames, m, context_.room.pool, &here);
-  gains_ = std::move(light.gains);
-  for (Gain& gain : gains_) gain = context_.of_format(gain);
+  WindowLight light = {{}, false};
+  if (shown > 0)
+    light = light_of(frames, shown, context_.room.pool, &here);
+  else
+    here = known.earlier->cells();
+  gains_.assign(static_cast<size_t>(m), kSameLight);
+  for (size_t i = 0; i < shown_.size(); ++i)
+    gains_[static_cast<size_t>(shown_[i])] = context_.of_format(light.gains[i]);
+  carry_gains();
   clips_ = light.clips;
   if (clips_ && known.earlier->known()) take_unit_of(known.earlier->cells(), &here);
 
-  const int of_window = std::min(m, context_.parameters.start_frames);
+  const int of_window = std::min(shown, context_.parameters.start_frames);
   looks.count = of_window + old;
   looks.pictures.resize(static_cast<size_t>(looks.count));
   if (old > 0) {
@@ -60,12 +69,13 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
     }
   }
   for (int i = 0; i < of_window; ++i) {
-    const int t = static_cast<int>(int64_t{i} * m / of_window);
+    const auto at = static_cast<int>(int64_t{i} * shown / of_window);
+    const int t = shown_[static_cast<size_t>(at)];
     looks.pictures[static_cast<size_t>(old + i)] = {
         {snapshots.plane(t, 0), snapshots.plane(t, 1), snapshots.plane(t, 2)},
         gains_[static_cast<size_t>(t)],
         snapshots.shape()};
-    looks.cells.push_back(frames.plane(t, 0));
+    looks.cells.push_back(frames.plane(at, 0));
     looks.numbers.push_back(window_->number(t));
   }
   if (!known.earlier->known()) return looks;
@@ -76,9 +86,31 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   looks.cells.push_back(earlier.plane(0, 0));
   looks.recollection = known.earlier->recollection(context_.parameters.earlier_share *
                                                    static_cast<float>(looks.count));
-  looks.recollection.older_frames = old;
+  looks.recollection.older_frames = of_window > 0 ? old : 0;
   if (known.history->young()) looks.recollection.share.clear();
   return looks;
+}
+
+// Frames that something disturbs say nothing, where others do.
+void WindowSolve::choose_shown(const Known& known, int old) {
+  const int m = window_->snapshots.size();
+  shown_.clear();
+  for (int t = 0; t < m; ++t)
+    if (!known.earlier->known() || !known.history->disturbances().has(window_->number(t)))
+      shown_.push_back(t);
+  if (!shown_.empty() || old > 0) return;
+  shown_.resize(static_cast<size_t>(m));
+  std::iota(shown_.begin(), shown_.end(), 0);
+}
+
+// Frames that something disturbs have the light of those before them.
+void WindowSolve::carry_gains() {
+  if (shown_.empty()) return;
+  size_t at = 0;
+  for (size_t t = 0; t < gains_.size(); ++t) {
+    while (at + 1 < shown_.size() && static_cast<size_t>(shown_[at + 1]) <= t) ++at;
+    gains_[t] = gains_[static_cast<size_t>(shown_[at])];
+  }
 }
 
 // Where samples are at the end of their range, a darker picture of earlier windows knows more: unit
