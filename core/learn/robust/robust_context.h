@@ -12,8 +12,7 @@ namespace qdmd {
 struct RobustContext {
   LearnOptions options;
   RobustParameters parameters;
-  Band band;
-  Grid grid;  // of the whole picture
+  Grid grid;
   int finest_step = 1, step = 1;
   LearnerRoom room = {};
 
@@ -29,18 +28,13 @@ struct RobustContext {
   // The shape of kept frames.
   ChromaShape shape() const {
     const FrameContents of = contents();
-    return {grid.width, band.rows(), of.chroma_columns, of.chroma_rows};
+    return {grid.width, grid.height, of.chroma_columns, of.chroma_rows};
   }
   size_t pixels() const {
-    return static_cast<size_t>(grid.width) * static_cast<size_t>(band.rows());
+    return static_cast<size_t>(grid.width) * static_cast<size_t>(grid.height);
   }
-  size_t samples_at(int of_step) const {
-    return static_cast<size_t>(band.samples(of_step)) * sample_count(grid.width, of_step);
-  }
-  // Own rows, counted among those that are kept.
-  SampledRows sampled_rows() const {
-    return {band.first_sample(step) - band.first(), band.own_end() - band.first(), step};
-  }
+  size_t samples_at(int of_step) const { return sample_count(grid.width, grid.height, of_step); }
+  SampledRows sampled_rows() const { return {0, grid.height, step}; }
   // Windows that know nothing of each other are given nothing of each other.
   bool follows(Models models) const {
     return models == Models::two_of_live || parameters.earlier_share > 0;

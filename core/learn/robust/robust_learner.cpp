@@ -19,24 +19,20 @@ int chosen_step(int width, int height) {
 
 }  // namespace
 
-static RobustContext context_of(const LearnOptions& options, int width, const Band& band,
+static RobustContext context_of(const LearnOptions& options, int width, int height,
                                 const RobustParameters& parameters) {
-  const int finest =
-      options.sample_step > 0 ? options.sample_step : chosen_step(width, band.height());
-  RobustContext context = {options, parameters,
-                           band,    Grid(width, band.height(), parameters.cells_along),
-                           finest,  finest};
+  const int finest = options.sample_step > 0 ? options.sample_step : chosen_step(width, height);
+  RobustContext context = {options, parameters, Grid(width, height, parameters.cells_along), finest,
+                           finest};
   // What the paper fits to the first frame depends on what stood there.
   context.options.dmd.amplitude = Amplitude::window;
   if (context.options.dmd.rank == 0) context.options.dmd.rank = 1;
-  if (!options.remembers)
-    context.parameters.earlier_share = context.parameters.remembered_share = 0;
   return context;
 }
 
-RobustLearner::RobustLearner(const LearnOptions& options, int width, const Band& band,
+RobustLearner::RobustLearner(const LearnOptions& options, int width, int height,
                              const RobustParameters& parameters)
-    : context_(context_of(options, width, band, parameters)),
+    : context_(context_of(options, width, height, parameters)),
       memory_(context_),
       history_(context_),
       solve_(context_),
@@ -164,8 +160,7 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
     const uint8_t* const level[kChannels] = {solve_.reference().level[0].data(),
                                              solve_.reference().level[1].data(),
                                              solve_.reference().level[2].data()};
-    find_own_cells(context_.grid, context_.band, level, cells, next, context_.room.pool);
-    share_cells(context_.grid, context_.band, cells, next);
+    find_cells(context_.grid, level, cells, next, context_.room.pool);
     model->set_gains(solve_.gains_of_frames(*cells, next));
     memory_.take(solve_, *cells, next, history_.held());
     solve_.write_limits(model->make_limits());
