@@ -27,6 +27,7 @@ struct StopPipeline {
 };
 using PipelinePtr = std::unique_ptr<GstElement, StopPipeline>;
 using ElementPtr = std::unique_ptr<GstElement, Free>;
+using PadPtr = std::unique_ptr<GstPad, Free>;
 using SamplePtr = std::unique_ptr<GstSample, Free>;
 using MessagePtr = std::unique_ptr<GstMessage, Free>;
 using CharsPtr = std::unique_ptr<gchar, Free>;
