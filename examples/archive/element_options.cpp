@@ -28,6 +28,14 @@ constexpr const char* kLeftOut[] = {"name",
                                     "object-gone-time",
                                     "motion-end-time"};
 
+// As an application makes one, which elements ask for their name.
+ElementPtr new_element() {
+  static const bool known = GST_ELEMENT_REGISTER(qdmdseparate, nullptr);
+  GstElement* const element = known ? gst_element_factory_make("qdmdseparate", nullptr) : nullptr;
+  if (!element) throw std::runtime_error("qdmdseparate cannot be made");
+  return ElementPtr(GST_ELEMENT(gst_object_ref_sink(element)));
+}
+
 std::string text_of(const GValue* value) {
   const CharsPtr text(gst_value_serialize(value));
   return text ? text.get() : "";
@@ -36,7 +44,7 @@ std::string text_of(const GValue* value) {
 }  // namespace
 
 std::vector<ElementOption> element_options() {
-  const ElementPtr element(GST_ELEMENT(g_object_new(gst_qdmd_separate_get_type(), nullptr)));
+  const ElementPtr element = new_element();
   guint count = 0;
   GParamSpec** const specs =
       g_object_class_list_properties(G_OBJECT_GET_CLASS(element.get()), &count);
@@ -75,8 +83,7 @@ void set_option(GstElement* element, const std::string& name, const std::string&
 }
 
 GstElement* make_element(const std::map<std::string, std::string>& values) {
-  ElementPtr element(GST_ELEMENT(gst_object_ref_sink(
-      g_object_new(gst_qdmd_separate_get_type(), "name", "separate", nullptr))));
+  ElementPtr element = new_element();
   for (const auto& [name, value] : values) set_option(element.get(), name, value);
   return element.release();
 }

@@ -74,14 +74,13 @@ CharsPtr text_of(const GstVideoColorimetry& colours) {
 // What frames become in that format.
 GstVideoInfo kept_info(const GstVideoInfo& seen, GstVideoFormat format, double rate) {
   GstVideoInfo kept;
-  gst_video_info_set_interlaced_format(&kept, format, GST_VIDEO_INFO_INTERLACE_MODE(&seen),
-                                       static_cast<guint>(GST_VIDEO_INFO_WIDTH(&seen)),
-                                       static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&seen)));
+  // Two fields are taken as the frame that they are in.
+  gst_video_info_set_format(&kept, format, static_cast<guint>(GST_VIDEO_INFO_WIDTH(&seen)),
+                            static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&seen)));
   // Grey ones that become R, G and B have those of R, G and B.
   if (GST_VIDEO_INFO_IS_RGB(&kept) == GST_VIDEO_INFO_IS_RGB(&seen))
     kept.colorimetry = seen.colorimetry;
   kept.chroma_site = seen.chroma_site;
-  GST_VIDEO_INFO_FIELD_ORDER(&kept) = GST_VIDEO_INFO_FIELD_ORDER(&seen);
   kept.par_n = seen.par_n;
   kept.par_d = seen.par_d;
   kept.fps_n = seen.fps_n;

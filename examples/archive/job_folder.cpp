@@ -46,6 +46,7 @@ LockedFile JobFolder::hold() const {
   const fs::path beside = fs::absolute(path_).parent_path();
   if (!fs::is_directory(beside))
     throw std::runtime_error(beside.string() + " is no folder: make it first");
+  fs::remove_all(temporary_of(path_));
   fs::create_directories(path_);
   return LockedFile::wait_for(file(kLock));
 }
@@ -97,9 +98,10 @@ void JobFolder::clear() {
 }
 
 void JobFolder::remove() const {
-  for (const auto& entry : fs::directory_iterator(path_))
-    if (entry.path().filename() != kPlan) fs::remove_all(entry.path());
-  fs::remove_all(path_);
+  // At once: who still looks finds all of it, or nothing.
+  const std::string going = temporary_of(path_);
+  fs::rename(path_, going);
+  fs::remove_all(going);
 }
 
 }  // namespace qdmd::archive

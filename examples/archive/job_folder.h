@@ -43,7 +43,7 @@ class JobFolder {
 
   // What another job has left goes, by whoever holds the folder.
   void clear();
-  // All of it goes; the plan last.
+  // All of it goes.
   void remove() const;
 
  private:

@@ -48,7 +48,7 @@ void declare(CLI::App& app, JobOptions& options, Words& words) {
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
   app.add_option("--warm-up", options.warm_up,
-                 "Frames before a stretch that the process looks at first (-1: two windows)")
+                 "Frames before a stretch that the process looks at first (-1: three windows)")
       ->check(CLI::Range(int64_t{-1}, int64_t{1} << 40))
       ->capture_default_str();
   app.add_option("--by", words.by,

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 // The scene's memory needs so many windows before pictures are what one process would have made of
 // them (docs/archive.md).
-constexpr int kWarmUpWindows = 2;
+constexpr int kWarmUpWindows = 3;
 // What is spent on warming up is at most one part in so many where the stretch is chosen.
 constexpr int kMostStretch = 25;
 // Frames whose times are compared with what is decoded.
