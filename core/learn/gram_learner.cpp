@@ -1,6 +1,7 @@
 #include "core/learn/gram_learner.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/dmd/qdmd.h"
 #include "core/model/build_spread.h"
@@ -155,12 +156,12 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
     const SnapshotRange columns = columns_of(snapshots);
     auto pixels = static_cast<int64_t>(columns.pixels());
     if (options_.add) options_.add({&pixels, 1});
-    const IntegerMatrix gram =
-        options_.add ? gram_.matrix(columns, options_.add) : gram_.matrix(columns);
+    // What a decomposition no longer needs of it, it gives back.
+    IntegerMatrix gram = options_.add ? gram_.matrix(columns, options_.add) : gram_.matrix(columns);
     Decomposition decomposition =
         options_.method == Method::dmd
-            ? decompose_channels(gram, options_.dmd)
-            : qdmd::decompose(columns, gram, options_.dmd, static_cast<double>(pixels));
+            ? decompose_channels(std::move(gram), options_.dmd)
+            : qdmd::decompose(columns, std::move(gram), options_.dmd, static_cast<double>(pixels));
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
     put_in_levels(options_.depth, &decomposed_.dmd);
