@@ -1,13 +1,14 @@
 #include "examples/archive/separation.h"
 
-#include <gst/app/gstappsink.h>
 #include <gst/app/gstappsrc.h>
 
 #include <algorithm>
 #include <atomic>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
+#include <utility>
 
 #include "examples/archive/element_options.h"
 #include "examples/archive/files.h"
@@ -48,7 +49,7 @@ class Separation {
       description += " queue name=in" + number +
                      " max-size-buffers=8 max-size-bytes=0 max-size-time=0" +
                      (is_mask ? " ! video/x-raw,format=GRAY8 ! " : " ! ");
-      description += one.is_picture() ? "appsink name=pictures sync=false max-buffers=2"
+      description += one.is_picture() ? "fakesink async=false"
                                       : encoding(options.encoder, is_mask ? grey(info_) : info_) +
                                             " ! filesink async=false name=out" + number;
     }
@@ -71,8 +72,9 @@ class Separation {
                         nullptr);
       if (!gst_element_link_pads(element, pad_of(one.output), branch->begin.get(), "sink"))
         throw std::runtime_error(one.path + " cannot be written");
+      branch->first = stretch_.first;
+      branch->window = one.is_picture() ? options.window : 0;
       if (one.is_picture()) {
-        pictures_ = element_of(pipeline_, "pictures");
         picture_path_ = one.path;
       } else {
         branch->path = part_of(one.path, index);
@@ -97,6 +99,7 @@ class Separation {
     GST_BUFFER_PTS(buffer) = time;
     GST_BUFFER_DTS(buffer) = GST_CLOCK_TIME_NONE;
     GST_BUFFER_FLAG_UNSET(buffer, GST_BUFFER_FLAG_DISCONT);
+    write_pictures();
     while (gst_app_src_get_current_level_buffers(GST_APP_SRC(source_.get())) >= kMostWaiting)
       wait(2 * GST_MSECOND);
     if (gst_app_src_push_buffer(GST_APP_SRC(source_.get()), buffer) == GST_FLOW_OK) return;
@@ -128,9 +131,9 @@ class Separation {
     }
     while (!wait(10 * GST_MSECOND)) {
     }
-    take_pictures();
-    if (picture_ && pictures_taken_ % options_.window != 0) write_picture();
     gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
+    for (auto& branch : branches_) branch->end_window();
+    write_pictures();
     for (auto& branch : branches_)
       if (!branch->path.empty()) give_name(branch->path);
   }
@@ -140,13 +143,28 @@ class Separation {
   struct Branch {
     std::string path;
     ElementPtr begin;
-    int64_t warm_up = 0;
+    int64_t warm_up = 0, first = 0;
+    int window = 0;  // frames, each last one of which is a picture; 0: there are none
     std::atomic<int64_t> left{0}, frames{std::numeric_limits<int64_t>::max()};
+    std::mutex lock;
+    std::vector<std::pair<int64_t, BufferPtr>> pictures;  // of windows
+    BufferPtr newest;                                     // of a window that has not ended
 
-    static GstPadProbeReturn on_frame(GstPad*, GstPadProbeInfo*, gpointer data) {
+    static GstPadProbeReturn on_frame(GstPad*, GstPadProbeInfo* info, gpointer data) {
       auto* const branch = static_cast<Branch*>(data);
       const int64_t own = branch->left++ - branch->warm_up;
-      return own >= 0 && own < branch->frames ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
+      if (own < 0 || own >= branch->frames) return GST_PAD_PROBE_DROP;
+      if (branch->window > 0) {
+        branch->newest.reset(gst_buffer_ref(GST_PAD_PROBE_INFO_BUFFER(info)));
+        if ((branch->first + own + 1) % branch->window == 0) branch->end_window();
+      }
+      return GST_PAD_PROBE_OK;
+    }
+    void end_window() {
+      if (!newest) return;
+      const std::lock_guard held(lock);
+      const int64_t frame = first + std::min<int64_t>(left - warm_up, frames) - 1;
+      pictures.emplace_back(frame / window, std::move(newest));
     }
   };
   static constexpr const char* kWhat = "the recording cannot be separated";
@@ -161,33 +179,29 @@ class Separation {
 
   // True: all files are whole.
   bool wait(GstClockTime time) {
-    take_pictures();
+    write_pictures();
     return has_ended(pipeline_, time, kWhat);
   }
 
-  void take_pictures() {
-    if (!pictures_) return;
-    while (SamplePtr sample{gst_app_sink_try_pull_sample(GST_APP_SINK(pictures_.get()), 0)}) {
-      picture_ = std::move(sample);
-      if (++pictures_taken_ % options_.window == 0) write_picture();
+  void write_pictures() {
+    for (auto& branch : branches_) {
+      std::unique_lock held(branch->lock);
+      const auto pictures = std::exchange(branch->pictures, {});
+      held.unlock();
+      for (const auto& [window, picture] : pictures) {
+        const std::string path = picture_of(picture_path_, window);
+        write_png(temporary_of(path), info_, picture.get());
+        give_name(path);
+      }
     }
-  }
-  // The newest frame's, of the window that ends with it.
-  void write_picture() {
-    const std::string path =
-        picture_of(picture_path_, (stretch_.first + pictures_taken_ - 1) / options_.window);
-    write_png(temporary_of(path), info_, gst_sample_get_buffer(picture_.get()));
-    give_name(path);
   }
 
   const SeparationOptions& options_;
   const GstVideoInfo info_;
   const Stretch stretch_;
   PipelinePtr pipeline_;
-  ElementPtr source_, pictures_;
+  ElementPtr source_;
   std::string picture_path_;
-  SamplePtr picture_;
-  int64_t pictures_taken_ = 0;
   std::vector<std::unique_ptr<Branch>> branches_;
 };
 
