@@ -160,7 +160,7 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
     IntegerMatrix gram = options_.add ? gram_.matrix(columns, options_.add) : gram_.matrix(columns);
     Decomposition decomposition =
         options_.method == Method::dmd
-            ? decompose_channels(std::move(gram), options_.dmd)
+            ? decompose_channels(gram, options_.dmd)
             : qdmd::decompose(columns, std::move(gram), options_.dmd, static_cast<double>(pixels));
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;

@@ -47,7 +47,7 @@ def clip(video, folder):
     source = f'filesrc location={video} ! decodebin' if video else 'qdmdscenesrc scene=basic'
     if not os.path.exists(path):
         launch(f'{source} ! videoconvert ! videoscale ! '
-               f'video/x-raw,format=I420,width={WIDTH},height={HEIGHT} ! identity eos-after={FILM + 1} ! '
+               f'video/x-raw,format=I420,width={WIDTH},height={HEIGHT} ! identity eos-after={FILM} ! '
                f'x264enc speed-preset=veryfast ! h264parse ! matroskamux ! filesink location={path}',
                '0,1')
     return path
@@ -65,7 +65,7 @@ def run(folder, recordings, *words, cores='0,1'):
 def two_against_one(folder, film):
     words = ['--background', f'{folder}/b.png', '--mask', f'{folder}/m.mkv', '--n-threads', 1,
              '--window', WINDOW]
-    return [(run(folder, [film] * TIMES, *words, '--stretch', FILM * TIMES, cores='0'),
+    return [(run(folder, [film] * TIMES, *words, '--stretch', 10**9, cores='0'),
              run(folder, [film] * TIMES, *words, '--jobs', 2)) for _ in range(TURNS)]
 
 
@@ -121,10 +121,8 @@ def agreement_table(folder):
         words = ['--mask', f'{folder}/a.mkv', '--window', WINDOW, '--framerate', rate]
         run(folder, [path], *words, '--stretch', 10**9)
         whole = masks_of(f'{folder}/a.mkv')
-        for parts in PARTS:
-            size = -(-len(whole) // parts // WINDOW) * WINDOW
-            if size >= len(whole):
-                continue
+        sizes = {-(-len(whole) // parts // WINDOW) * WINDOW for parts in PARTS}
+        for size in sorted(sizes - {-(-len(whole) // WINDOW) * WINDOW}, reverse=True):
             run(folder, [path], *words, '--stretch', size, '--warm-up', WARM_UP)
             masks = masks_of(f'{folder}/a.mkv')
             first = {t for t in range(size, len(whole)) if t % size < rate}
@@ -139,20 +137,22 @@ def agreement_table(folder):
 def model_table(pairs, decode):
     """Hours of a long recording, of machines with one core each."""
     one = pairs[0][0]
-    work = median(processor(a) for a, _ in pairs) / one['frames']
+    first, second = ([b['stretches'][i] for _, b in pairs] for i in (0, 1))
+    work = median(s['processor-seconds'] / s['frames'] for s in first)
+    warm = median((s['processor-seconds'] - work * s['frames']) / s['warm-up'] for s in second)
     joining = median(a['seconds-joining'] for a, _ in pairs) / one['frames']
     frames = HOURS * 3600 * 25
     stretch = 25 * WARM_UP
     rows = []
     for machines in MACHINES:
         turns = -(-frames // stretch // machines)
-        worked = turns * (stretch + (WARM_UP if machines > 1 else 0)) * work
+        worked = turns * (stretch * work + WARM_UP * warm) if machines > 1 else frames * work
         joined = joining * frames
         rows.append([str(machines), f'{worked / 3600:.2f}', f'{joined / 3600:.2f}',
                      f'{(worked + joined) / 3600:.2f}',
                      f'{(frames * work + joined) / (worked + joined):.1f}'])
     text = (f'A frame takes {1000 * work:.1f} ms of one core, {1000 * decode:.1f} ms of them to decode '
-            f'it; joining takes {1000 * joining:.2f} ms.')
+            f'it; one to warm up {1000 * warm:.1f} ms; joining takes {1000 * joining:.2f} ms.')
     return text + '\n\n' + page.table(
         ['machines', f'h of work, {HOURS} h of 1920x1080', 'h of joining', 'h in all',
          'times as fast'], rows)
