@@ -23,7 +23,7 @@ Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room
     : room_(room),
       colours_(colours),
       learner_(std::move(learner)),
-      decision_(room.frames->width(), room.frames->band(), colours, steps, levels) {
+      decision_(room.frames->width(), room.frames->height(), colours, steps, levels) {
   for (BackgroundModel& model : models_) {
     model.set_depth(room_.frames->depth());
     model.set_samples({colours, levels}, levels.range());
@@ -98,7 +98,7 @@ void Background::finish(const Wishes& wishes) {
   if (!models_[next()].is_finite() || !is_finite(next_report_.dmd)) replace_next();
   next_report_.foreground =
       foreground_statistics(*snapshots_, models_[next()], wishes.foreground_threshold, *room_.pool,
-                            wishes.ignored, room_.frames->width(), room_.frames->band(), colours_);
+                            wishes.ignored, room_.frames->width(), colours_);
   // Nobody decides before there is a first model.
   if (wishes.masks_expected && room_.models != Models::two_of_live && !known_ &&
       decision_.new_born())

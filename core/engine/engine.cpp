@@ -16,11 +16,11 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   const EngineLayout& layout = plan_.layout();
   const bool live = options.mode == Mode::live;
   auto learner = plan_.take_learner();
-  // What members tell each other has one order.
-  workers_ = std::make_unique<Workers>(options.threads, !options.team);
+  // What processes add up has one order.
+  workers_ = std::make_unique<Workers>(options.threads, !options.add);
   const uint64_t beside = layout.bytes - layout.store_bytes;
-  frames_ = FrameStore(layout.capacity, width, plan_.band(), learner->contents(),
-                       options.max_memory - beside);
+  frames_ =
+      FrameStore(layout.capacity, width, height, learner->contents(), options.max_memory - beside);
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan_.live().hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -65,12 +65,6 @@ void Engine::flush() {
 
 void Engine::go_on() {
   if (configured() && schedule_->queue().pending == 0) schedule_->go_on();
-}
-
-void Engine::begin_anew() {
-  if (!configured() || schedule_->queue().pending > 0) return;
-  background_->forget();
-  schedule_->go_on();
 }
 
 Status Engine::push(const ImageView& frame, const Wishes* wishes) {
@@ -135,14 +129,13 @@ Status Engine::drain() {
 bool Engine::write_background(const MutableImageView& out) {
   if (!configured() || !background_->known()) return false;
   schedule_->show_newest();
-  const Band& band = plan_.band();
-  write_picture(task_of_background(frames_, background_->model()), plan_.options().levels, out,
-                band.own_begin(), band.own_rows());
+  write_picture(task_of_background(frames_, background_->model()), plan_.options().levels, out, 0,
+                frames_.height());
   return true;
 }
 
 bool Engine::learnt(Learnt* learnt) {
-  if (!configured() || !background_->known() || !plan_.band().is_whole()) return false;
+  if (!configured() || !background_->known()) return false;
   // What it threw, the next frame is told.
   workers_->rest();
   schedule_->show_newest();

@@ -54,9 +54,8 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  // Starts afresh with frames of width x height pixels (EnginePlan). If a team shares them, push()
-  // then takes the rows of the plan's band that are kept, and pictures that are written have its
-  // own rows. If it refuses, nothing has changed.
+  // Starts afresh with frames of width x height pixels (EnginePlan). If it refuses, nothing has
+  // changed.
   Status configure(const EngineOptions& options, int width, int height);
   bool configured() const { return schedule_ != nullptr; }
   // What it was configured with.
@@ -78,8 +77,6 @@ class Engine {
   // No frame waits after drain(): the next frame comes after the one before it, after all. A window
   // that ends early has the frames before it. Batch only.
   void go_on();
-  // As go_on(), but windows to come know nothing of those before.
-  void begin_anew();
 
   // Writes the newest background. Batch: the background of the last frame of the newest solved
   // window. Live: of the frame with which the newest model came. While a background is held: that

@@ -8,7 +8,6 @@
 #include "core/engine/wishes.h"
 #include "core/foreground/decision_steps.h"
 #include "core/learn/learner.h"
-#include "core/parallel/team.h"
 #include "core/parallel/workers.h"
 
 namespace qdmd {
@@ -27,10 +26,6 @@ struct EngineOptions : LearnOptions, PictureWishes {
   Stabilize stabilize = Stabilize::off;     // how the camera may move
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
-  // Processes that have the other rows of the frames, one Engine each, all with the same options;
-  // or null. Batch mode, `stabilize` off, hard masks, windows that do not remember others, and no
-  // solver that reads pixels.
-  Team* team = nullptr;
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;

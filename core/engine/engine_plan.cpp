@@ -17,16 +17,6 @@
 namespace qdmd {
 namespace {
 
-// Rows of the picture where a member's own ones may begin: a row of cells does, and pixels that
-// share a sample stay together.
-std::vector<int> tops_of(const EngineOptions& options, int width, int height) {
-  const Grid grid(width, height);
-  std::vector<int> tops;
-  for (int row = 0; row < grid.rows; ++row)
-    if (grid.top(row) % options.chroma_rows == 0) tops.push_back(grid.top(row));
-  return tops;
-}
-
 // More than the sums of a Gram matrix can hold, or rows that are longer than a pass adds up. Bytes
 // of fewer pixels, in any window, are below 2^63.
 bool has_too_many_pixels(int width, int height) {
@@ -66,25 +56,13 @@ Models models_of(Mode mode, int late_frames) {
   return late_frames > 0 ? Models::two : Models::one;
 }
 
-Band band_of(const EngineOptions& options, int width, int height) {
-  if (!options.team) return Band(height);
-  const std::vector<int> tops = tops_of(options, width, height);
-  const auto size = static_cast<size_t>(options.team->size());
-  std::vector<int> ends;
-  for (size_t rank = 1; rank < size; ++rank) ends.push_back(tops[rank * tops.size() / size]);
-  ends.push_back(height);
-  const int learnt = options.method == Method::robust ? RobustLearner::reach(options) : 0;
-  const int halo = learnt + Decision::reach(width, height), together = options.chroma_rows;
-  return Band(options.team, std::move(ends), (halo + together - 1) / together * together);
-}
-
 // Frames that a camera's movement moves share no samples, which only a learner whose solves are one
 // piece can meet while frames come.
-std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, const Band& band) {
+std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int height) {
   LearnOptions learnt = options;
   const bool moves = options.stabilize != Stabilize::off && options.method != Method::robust;
   if (moves) learnt.chroma_columns = learnt.chroma_rows = 1;
-  return Learner::make(learnt, width, band);
+  return Learner::make(learnt, width, height);
 }
 
 // "100 frames of 640x480".
@@ -93,29 +71,22 @@ std::string describe(const EngineOptions& options, int width, int height) {
          std::to_string(height);
 }
 
-Status check_team(const EngineOptions& options, int width, int height) {
+// Of a process that has some rows of pictures.
+Status check_rows(const EngineOptions& options) {
   using Code = Status::Code;
-  if (!options.team) return {};
-  if (options.mode != Mode::batch || options.stabilize != Stabilize::off ||
-      options.mask_softness > 0 || options.depth > 8)
-    return {
-        Code::invalid_options,
-        "processes share a window in mode=batch with stabilize=off and mask-softness=0 only, of "
-        "video of 8 bits"};
-  // What an earlier window's background was is not known as far outwards as its frames are.
-  if (options.method == Method::robust && options.remembers)
+  if (!options.add) return {};
+  if (options.method == Method::robust || options.mode != Mode::batch ||
+      options.stabilize != Stabilize::off)
     return {Code::invalid_options,
-            "processes that share a window forget it before the next: remembers=false"};
-  if (options.method != Method::dmd &&
+            "processes share a picture's rows with method=qdmd and dmd, mode=batch and "
+            "stabilize=off only"};
+  if (options.method == Method::qdmd &&
       (options.dmd.solver == Solver::qr || options.dmd.solver == Solver::adjoint))
     return {Code::invalid_options,
             "solver=qr and solver=adjoint need all pixels in one process: use gram, gram-extended "
             "or auto"};
-  const auto most = static_cast<int>(tops_of(options, width, height).size());
-  if (options.team->size() > most)
-    return {Code::invalid_options, "frames of " + std::to_string(width) + "x" +
-                                       std::to_string(height) + " can be shared by " +
-                                       std::to_string(most) + " processes at most: start fewer"};
+  if (options.first_row < 0 || options.first_row % options.chroma_rows != 0)
+    return {Code::invalid_options, "pixels that share a sample belong to one process"};
   return {};
 }
 
@@ -148,7 +119,7 @@ Status check_options(const EngineOptions& options, int width, int height) {
   if (!(options.frame_rate >= 0)) return {Code::invalid_options, "a frame rate is not negative"};
   if (options.threads < 0 || options.threads > EngineOptions::kMaxThreads)
     return {Code::invalid_options, "n-threads must be 0 (all cores) to 256"};
-  return check_team(options, width, height);
+  return check_rows(options);
 }
 
 }  // namespace
@@ -160,14 +131,13 @@ EnginePlan::EnginePlan(const EngineOptions& options, int width, int height)
   if (has_too_many_pixels(width, height)) {
     layout_.bytes = UINT64_MAX;
   } else {
-    band_ = band_of(options, width, height);
-    learner_ = learner_of(options, width, band_);
+    learner_ = learner_of(options, width, height);
     const bool live = options.mode == Mode::live;
     if (live) live_ = plan_of(options, *learner_, width, height);
     int late = 0;
     if (live)
       late = live_.most_late_frames();
-    else if (!options.team)
+    else if (!options.add)
       late = late_frames_of(options, *learner_);
     layout_ = layout_with(late);
     // Less time for a solve where there is no room for more frames.
@@ -179,7 +149,6 @@ EnginePlan::EnginePlan(const EngineOptions& options, int width, int height)
 }
 
 EngineLayout EnginePlan::layout_with(int late_frames) const {
-  const int height = band_.rows();
   const bool live = options_.mode == Mode::live;
   EngineLayout layout;
   layout.late_frames = late_frames;
@@ -190,16 +159,16 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
   if (!live && learner_->may_read_frames(options_.window_size))
     layout.capacity += options_.window_size;
   const FrameContents contents = learner_->contents();
-  const ChromaShape shape = {width_, height, contents.chroma_columns, contents.chroma_rows};
+  const ChromaShape shape = {width_, height_, contents.chroma_columns, contents.chroma_rows};
   layout.frame_bytes = PlaneSlots::bytes(layout.capacity, shape, options_.depth);
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width_, band_, contents);
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width_, height_, contents);
   if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width_, height_);
   const uint64_t masks =
-      Decision::bytes(width_, band_) + layout.soft_bytes + room_for_planes(shape, options_.depth);
+      Decision::bytes(width_, height_) + layout.soft_bytes + room_for_planes(shape, options_.depth);
   const uint64_t camera =
       options_.stabilize == Stabilize::off
           ? 0
-          : Stabilizer::bytes(width_, height) + Restorer::bytes(width_, height, options_.depth);
+          : Stabilizer::bytes(width_, height_) + Restorer::bytes(width_, height_, options_.depth);
   layout.bytes = saturating_sum(
       saturating_sum(layout.store_bytes, masks + camera),
       learner_->bytes(options_.window_size, layout.capacity, models_of(options_.mode, late_frames),
@@ -209,7 +178,7 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
 
 uint64_t EnginePlan::bytes_of_any_size() const {
   EngineOptions options = options_;
-  options.team = nullptr;
+  options.add = nullptr;
   options.max_memory = UINT64_MAX;
   // Frames that arrive while a window is solved are left out where there is no room for them.
   options.frame_rate = 0;
@@ -248,16 +217,13 @@ Status EnginePlan::check_memory() const {
 Status EnginePlan::alpha_refused(uint64_t store_bytes) const {
   return {
       Status::Code::too_much_memory,
-      "A window-size of " + describe(options_, width_, band_.rows()) +
-          " whose alpha varies needs " +
+      "A window-size of " + describe(options_, width_, height_) + " whose alpha varies needs " +
           std::to_string(layout_.bytes - layout_.store_bytes + store_bytes) +
           " bytes and max-memory allows " + std::to_string(options_.max_memory) +
           ": lower window-size, scale the video down, take the alpha out, or raise max-memory."};
 }
 
 Status EnginePlan::may_learn_from(const Learnt& learnt) const {
-  if (!band_.is_whole())
-    return {Status::Code::invalid_options, "processes that share a window load no background"};
   if (learnt.width != width_ || learnt.height != height_)
     return {Status::Code::invalid_options,
             "it is the background of " + std::to_string(learnt.width) + "x" +

@@ -9,7 +9,6 @@
 #include "core/engine/engine_options.h"
 #include "core/engine/live_plan.h"
 #include "core/model/learnt.h"
-#include "core/parallel/band.h"
 
 namespace qdmd {
 
@@ -35,10 +34,7 @@ class EnginePlan {
   const Status& status() const { return status_; }
   const EngineOptions& options() const { return options_; }
   int width() const { return width_; }
-  int height() const { return height_; }  // of the picture
-  // The rows that this process has: it pushes those that are kept, and has pictures of its own
-  // ones. Without a team: all.
-  const Band& band() const { return band_; }
+  int height() const { return height_; }
   // Bytes are UINT64_MAX, and the rest is nothing, where there are too many pixels.
   const EngineLayout& layout() const { return layout_; }
   Models models() const { return models_; }
@@ -61,7 +57,6 @@ class EnginePlan {
   EngineOptions options_;
   int width_ = 0, height_ = 0;
   Status status_;
-  Band band_;
   std::unique_ptr<Learner> learner_;
   LivePlan live_;
   EngineLayout layout_;

@@ -143,12 +143,11 @@ void LeavingFrame::write(Output output, const Levels& levels, const MutableImage
 
 void LeavingFrame::write(const OutputTask& task, const Levels& levels,
                          const MutableImageView& out) {
-  const Band& band = frames().band();
-  const int top = band.own_begin(), height = band.own_rows(), together = rows_together(out);
+  const int height = frames().height(), together = rows_together(out);
   const int steps = (height + together - 1) / together;
   const auto write = [&](int first, int count) {
     const int row = first * together;
-    write_picture(task, levels, out, top + row, std::min(count * together, height - row));
+    write_picture(task, levels, out, row, std::min(count * together, height - row));
   };
   for_rows(pool(), steps, frames().window().pixels(), write);
 }
@@ -164,15 +163,6 @@ void LeavingFrame::write_frame(const Levels& levels, const MutableImageView& out
       for (int c = 0; c < kChannels; ++c) task.x[c] = frames().untouched(slot(), c);
     task.mask = everything_.data();
     write(task, levels, out);
-  });
-}
-
-const uint8_t* LeavingFrame::whole_mask() {
-  const Clock::Span span(*stage_.clock, Clock::frames);
-  return flushed_if_it_throws(this, [&] {
-    OutputTask task = task_of(Output::mask);
-    decide(&task);
-    return stage_.background->decision().whole_mask();
   });
 }
 

@@ -21,14 +21,10 @@ class LeavingFrame {
   // `schedule` gives. levels: of the frames. soft: takes the memory of soft masks now.
   LeavingFrame(const Stage& stage, Schedule* schedule, const Levels& levels, bool soft);
 
-  // Writes a picture. `out` has the configured size; if a team shares the frames, the rows that are
-  // kept, of which its own are written. `levels` are its black, white and neutral chroma: the
-  // configured ones, or, for a mask in another format, the levels of that format. Samples have the
-  // configured depth, or 8 bits: the highest ones.
+  // Writes a picture. `out` has the configured size; `levels` are its black, white and neutral
+  // chroma: the configured ones, or, for a mask in another format, the levels of that format.
+  // Samples have the configured depth, or 8 bits: the highest ones.
   void write(Output output, const Levels& levels, const MutableImageView& out);
-  // The mask of the whole picture, even if a team shares it: 255 where foreground, else 0,
-  // width * height samples in row order. Good until skip().
-  const uint8_t* whole_mask();
   // The mask, as in Output::mask but hard: 255 where foreground, else 0, width * height samples in
   // row order. Good until the next call.
   const uint8_t* mask();

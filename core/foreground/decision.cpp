@@ -124,66 +124,41 @@ DecisionSteps in_levels_of(Colours colours, DecisionSteps steps) {
 
 int search_step(int width, int height) { return std::max(1, std::min(width, height) / 240); }
 
-// Pixels of a member's own rows, packed, of any member: bytes.
-size_t packed_size(const Band& band, int rank, int width) {
-  const auto rows = static_cast<size_t>(band.end_of(rank) - band.begin_of(rank));
-  return (rows * static_cast<size_t>(width) + 7) / 8;
-}
-
 }  // namespace
 
-Decision::Shape::Shape(int width_, const Band& band, bool votes)
+Decision::Shape::Shape(int width_, int height_, bool votes)
     : width(width_),
-      height(band.rows()),
-      step(search_step(width, band.height())),
+      height(height_),
+      step(search_step(width, height)),
       margin(kPlaces * step),
-      reach(votes ? voting_reach(width, band.height()) : 0),
+      reach(votes ? voting_reach(width, height) : 0),
       strips(std::clamp(height / std::max({kStrip, margin, kShadingReach}), 1, kMostStrips)),
       stride(static_cast<size_t>(width + 2 * margin)) {}
 
-Decision::Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps,
+Decision::Decision(int width, int height, Colours colours, const DecisionSteps& steps,
                    const Levels& levels)
-    : band_(band),
-      shape_(width, band, steps.vote),
+    : shape_(width, height, steps.vote),
       steps_(in_levels_of(colours, steps)),
       colours_(colours),
       grey_(colours == Colours::grey),
-      texture_(width, band, steps.constants),
-      noise_(width, band.rows(), steps.constants, band.first()),
-      specks_(width, band.height()),
+      texture_(width, height, steps.constants),
+      noise_(width, height, steps.constants),
+      specks_(width, height),
       unknown_(static_cast<size_t>(shape_.strips)) {
   for (auto& level : of_.level) level.resize(shape_.padded(), 0);
   of_.differing.resize(shape_.padded(), 0);
   of_.foreground.resize(shape_.padded(), 0);
   of_.mask.resize(shape_.pixels(), 0);
   of_.shaded.resize(shape_.pixels(), 0);
-  if (!band.is_whole()) {
-    whole_.resize(static_cast<size_t>(width) * static_cast<size_t>(band.height()));
-    size_t bytes = 0;
-    for (int rank = 0; rank < band.members(); ++rank) bytes += packed_size(band, rank, width);
-    packed_.resize(bytes);
-  }
   std::copy_n(levels.black, kChannels, black_);
   rgb_ = RgbColours(colours, levels);
 }
 
-uint64_t Decision::bytes(int width, const Band& band) {
-  const Shape shape(width, band, true);
-  uint64_t shared = 0;
-  if (!band.is_whole()) {
-    shared = static_cast<uint64_t>(width) * static_cast<uint64_t>(band.height());
-    for (int rank = 0; rank < band.members(); ++rank) shared += packed_size(band, rank, width);
-  }
-  return 5 * uint64_t{shape.padded()} + 2 * uint64_t{shape.pixels()} + shared +
-         MovingTexture::bytes(width, band.height()) + PixelNoise::bytes(width, band.rows()) +
-         Specks::bytes(width, band.height());
-}
-
-// A pixel's vote looks at its neighbours' explanations; these at L around, and at the light of
-// pixels whose means may be compared; where a texture moves, noise is learnt from L around.
-int Decision::reach(int width, int height) {
-  const int explained = std::max(kPlaces * search_step(width, height), kShadingReach + 1);
-  return voting_reach(width, height) + explained;
+uint64_t Decision::bytes(int width, int height) {
+  const Shape shape(width, height, true);
+  return 5 * uint64_t{shape.padded()} + 2 * uint64_t{shape.pixels()} +
+         MovingTexture::bytes(width, height) + PixelNoise::bytes(width, height) +
+         Specks::bytes(width, height);
 }
 
 void Decision::forget() {
@@ -210,8 +185,8 @@ void Decision::level(int y, const uint8_t* out[3]) const {
 }
 
 void Decision::decide(const Comparison& frame, Pool* pool) {
-  const auto in_rows = [&](const auto& band) {
-    for_rows(pool, shape_.height, shape_.pixels(), band);
+  const auto in_rows = [&](const auto& work) {
+    for_rows(pool, shape_.height, shape_.pixels(), work);
   };
   now_.frame = frame;
   now_.pool = pool;
@@ -253,20 +228,16 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
           shape_.reach},
          first, size, of_.mask.data());
   });
-  share_mask();
-  uint8_t* const mask = band_.is_whole() ? of_.mask.data() : whole_.data();
+  uint8_t* const mask = of_.mask.data();
   if (steps_.specks && shape_.reach > 0) {
     const auto area = [&](double share) {
-      const double pixels = static_cast<double>(shape_.width) * band_.height();
-      return static_cast<size_t>(share * pixels);
+      return static_cast<size_t>(share * static_cast<double>(shape_.pixels()));
     };
     specks_.take_out(mask, 255, area(constants().least_foreground), true);
     specks_.take_out(mask, 0, area(constants().least_hole), false);
   }
   // Pixels around it may have overruled some.
-  if (frame.ignored) frame.ignored->clear_rows(0, band_.height(), shape_.width, mask);
-  if (!band_.is_whole())
-    std::copy_n(whole_.data() + shape_.first(band_.first()), shape_.pixels(), of_.mask.data());
+  if (frame.ignored) frame.ignored->clear_rows(0, shape_.height, shape_.width, mask);
   if (learns) {
     in_rows([&](int first, int size) { learn(first, size); });
     noise_.end_frame();
@@ -275,39 +246,14 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   ++frames_;
 }
 
-// All members must say the same of a picture that each of them has a part of: the format's colours.
 void Decision::find_colour() {
-  if (!band_.is_whole()) return;
   const uint8_t* const x[3] = {now_.frame.x[0].high, now_.frame.x[1].high, now_.frame.x[2].high};
   grey_ = is_grey(x, static_cast<size_t>(shape_.width), static_cast<size_t>(shape_.height),
                   colours_, black_);
 }
 
-// A part of the mask may go on in other members' rows.
-void Decision::share_mask() {
-  if (band_.is_whole()) return;
-  const auto width = static_cast<size_t>(shape_.width);
-  std::vector<size_t> ends;
-  for (int rank = 0; rank < band_.members(); ++rank)
-    ends.push_back((rank > 0 ? ends.back() : 0) + packed_size(band_, rank, shape_.width));
-  const auto rank = static_cast<size_t>(band_.team()->rank());
-  uint8_t* const bits = packed_.data() + (rank > 0 ? ends[rank - 1] : 0);
-  const uint8_t* const own = of_.mask.data() + shape_.first(band_.own_begin());
-  const size_t count = static_cast<size_t>(band_.own_rows()) * width;
-  pack_mask(own, count, bits);
-  band_.team()->share(Talk::masks, std::as_writable_bytes(std::span(packed_)), ends);
-  for (int r = 0; r < band_.members(); ++r) {
-    const uint8_t* const from =
-        packed_.data() + ends[static_cast<size_t>(r)] - packed_size(band_, r, shape_.width);
-    uint8_t* const to = whole_.data() + static_cast<size_t>(band_.begin_of(r)) * width;
-    const size_t pixels = static_cast<size_t>(band_.end_of(r) - band_.begin_of(r)) * width;
-    unpack_mask(from, pixels, to);
-  }
-}
-
 const uint8_t* Decision::mask_row(int y) const {
-  if (band_.is_whole()) return of_.mask.data() + shape_.first(std::clamp(y, 0, shape_.height - 1));
-  return whole_.data() + shape_.first(std::clamp(band_.first() + y, 0, band_.height() - 1));
+  return of_.mask.data() + shape_.first(std::clamp(y, 0, shape_.height - 1));
 }
 
 void Decision::clear_marks() {
@@ -375,8 +321,7 @@ void Decision::compare(int first_row, int row_count) {
         foreground_mask(x, level, count, now_.threshold, nullptr, differing_row(y) + left);
     }
     for (int c = 0; c < kChannels && !now_.level_known; ++c) repeat_border(level_row(c, y));
-    if (now_.frame.ignored)
-      now_.frame.ignored->clear(band_.first() + y, 0, shape_.width, differing_row(y));
+    if (now_.frame.ignored) now_.frame.ignored->clear(y, 0, shape_.width, differing_row(y));
     repeat_border(differing_row(y));
   }
 }
@@ -397,7 +342,7 @@ void Decision::compare_means(int first_row, int row_count) {
       for (int p = 0; p < run.count; ++p)
         row[left + p] = run.own[p] > most && run.nearest[p] > alone ? 255 : 0;
     }
-    if (now_.frame.ignored) now_.frame.ignored->clear(band_.first() + y, 0, shape_.width, row);
+    if (now_.frame.ignored) now_.frame.ignored->clear(y, 0, shape_.width, row);
     repeat_border(row);
   }
 }
@@ -415,9 +360,9 @@ void Decision::explain(int first_row, int row_count) {
   size_t first_cell = 0;
   bool moving = false;
   for (int y = first_row; y < first_row + row_count; ++y) {
-    if (grid_row < 0 || grid.top(grid_row + 1) <= band_.first() + y) {
+    if (grid_row < 0 || grid.top(grid_row + 1) <= y) {
       do ++grid_row;
-      while (grid.top(grid_row + 1) <= band_.first() + y);
+      while (grid.top(grid_row + 1) <= y);
       first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
       moving = false;
       for (int col = 0; col < grid.cols; ++col)
@@ -452,9 +397,7 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
   const Grid& grid = texture_.grid();
   const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
   // Where nothing moves, a few rows are enough.
-  const bool sampled = now_.textures && texture_.samples(band_.first() + y);
-  // Others count their own rows.
-  const bool own = y >= band_.own_begin() && y < band_.own_begin() + band_.own_rows();
+  const bool sampled = now_.textures && texture_.samples(y);
   bool moving = false;
   int col = texture_.col_of(left);
   for (int at = col; at <= texture_.col_of(right - 1); ++at)
@@ -473,10 +416,8 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
   uint16_t moved[kLongestRun];
   if (sampled) {
     const Around<0, kLongestRun> middle(*this, y, left, run.count);
-    const int row = band_.first() + y;
-    const uint8_t* const before[3] = {texture_.before(0, row) + left,
-                                      texture_.before(1, row) + left,
-                                      texture_.before(2, row) + left};
+    const uint8_t* const before[3] = {texture_.before(0, y) + left, texture_.before(1, y) + left,
+                                      texture_.before(2, y) + left};
     squared_distance(middle.x, before, static_cast<size_t>(run.count), moved);
   }
   const uint8_t* const differing = differing_row(y) + left;
@@ -493,7 +434,7 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     const int end = std::min(run.count, grid.left(col + 1) - left);
     const auto size = static_cast<size_t>(end - p);
     const size_t cell = first_cell + static_cast<size_t>(col);
-    if (sampled && own)
+    if (sampled)
       texture_.add(cell, {differing + p, run.own + p, run.nearest + p, moved + p, end - p},
                    now_.frame.threshold);
     if (moves(cell)) {
@@ -505,10 +446,9 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
       std::copy_n(noise + p, size, known);
       learn_distance(run.nearest + p, size, texture_.share(cell), noise + p);
       if (now_.frame.ignored)
-        now_.frame.ignored->visit(band_.first() + y, left + p, end - p,
-                                  [&](int64_t first, int64_t last) {
-                                    std::copy(known + first, known + last, noise + p + first);
-                                  });
+        now_.frame.ignored->visit(y, left + p, end - p, [&](int64_t first, int64_t last) {
+          std::copy(known + first, known + last, noise + p + first);
+        });
     } else if (moving) {
       raise_limit(noise + p, factor, size, run.limit + p);
       keep_beyond(run.own + p, run.limit + p, size, foreground + p);
@@ -584,7 +524,7 @@ void Decision::learn(int first_row, int row_count) {
   int grid_row = 0;
   for (int y = first_row; y < first_row + row_count; ++y) {
     if (!noise_.learns_from(y)) continue;
-    while (grid.top(grid_row + 1) <= band_.first() + y) ++grid_row;
+    while (grid.top(grid_row + 1) <= y) ++grid_row;
     const auto first_cell = static_cast<size_t>(grid_row) * static_cast<size_t>(grid.cols);
     const uint8_t* const rows[3] = {mask_row(y - near), mask_row(y), mask_row(y + near)};
     for (int left = 0; left < shape_.width; left += kLongestRun) {
@@ -609,11 +549,10 @@ void Decision::learn(int first_row, int row_count) {
         for (int p = begin; p < end; ++p) wide[p] = 255, now[p] = 0;
       }
       if (now_.frame.ignored)
-        now_.frame.ignored->visit(band_.first() + y, left, run.count,
-                                  [&](int64_t begin, int64_t end) {
-                                    std::fill(wide + begin, wide + end, uint8_t{255});
-                                    std::fill(now + begin, now + end, uint8_t{0});
-                                  });
+        now_.frame.ignored->visit(y, left, run.count, [&](int64_t begin, int64_t end) {
+          std::fill(wide + begin, wide + end, uint8_t{255});
+          std::fill(now + begin, now + end, uint8_t{0});
+        });
       noise_.learn(y, static_cast<size_t>(left), static_cast<size_t>(run.count), run.own, run.limit,
                    wide, now);
     }

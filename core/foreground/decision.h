@@ -61,15 +61,11 @@ struct Comparison {
 // come in the stream's order.
 class Decision {
  public:
-  // Takes all memory. For frames of that width and these colours, in which black is that of
-  // `levels`, and a band of their rows: what it is given, and what it says, has the rows that are
-  // kept; of these the own ones are decided as in the whole picture if reach() rows are kept around
-  // them, and masks are the same everywhere.
-  Decision(int width, const Band& band, Colours colours, const DecisionSteps& steps = {},
+  // Takes all memory. For frames of that size and these colours, in which black is that of
+  // `levels`.
+  Decision(int width, int height, Colours colours, const DecisionSteps& steps = {},
            const Levels& levels = {});
-  static uint64_t bytes(int width, const Band& band);
-  // What own rows depend on, in rows of the frames and their L.
-  static int reach(int width, int height);
+  static uint64_t bytes(int width, int height);
 
   // The next frame is of another stream.
   void forget();
@@ -85,8 +81,6 @@ class Decision {
   void decide(const Comparison& frame, Pool* pool);
   // 255 where foreground, else 0; samples in row order.
   const uint8_t* mask() const { return of_.mask.data(); }
-  // The mask of the whole picture.
-  const uint8_t* whole_mask() const { return band_.is_whole() ? mask() : whole_.data(); }
   // A second mask where shadows are marked: 255 where light alone differs.
   const uint8_t* shaded() const {
     return now_.frame.shadows == Shadows::marked ? of_.shaded.data() : nullptr;
@@ -104,7 +98,7 @@ class Decision {
     int strips;  // of rows, each as high as what explain() sees around a row
     size_t stride;
 
-    Shape(int width, const Band& band, bool votes);
+    Shape(int width, int height, bool votes);
     size_t pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
     size_t padded() const { return stride * static_cast<size_t>(height); }
     // Where a row with margins begins, and one without.
@@ -145,9 +139,8 @@ class Decision {
   const DecisionConstants& constants() const { return steps_.constants; }
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
   void clear_marks();
-  void share_mask();
   void find_colour();
-  // The mask's row y of those that are kept, or the picture's if there is none.
+  // The mask's row y, or the nearest one.
   const uint8_t* mask_row(int y) const;
   void look();
   // Steps of a frame; threads have rows of their own.
@@ -163,7 +156,6 @@ class Decision {
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
 
-  Band band_;
   Shape shape_;
   DecisionSteps steps_;
   // Samples without light. Grey pixels all have one colour: light cannot be told from things.
@@ -182,7 +174,6 @@ class Decision {
   Specks specks_;
   // By strip: itself and those beside it are counted, while a frame's are not compared yet.
   std::vector<std::atomic<int>> unknown_;
-  std::vector<uint8_t> whole_, packed_;  // of a band: the picture's mask, and its bits
   int64_t frames_ = 0;
   uint64_t picture_ = 0;  // of the model: whose L there is
   Now now_;

@@ -30,24 +30,16 @@ double automatic_threshold(double noise, Colours colours) {
 
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, Pool& pool,
-                                           const IgnoredAreas& ignored, int width, const Band& band,
+                                           const IgnoredAreas& ignored, int width,
                                            Colours colours) {
   constexpr int kFrames = 12;
   constexpr size_t kRunsPerFrame = 24;
   constexpr double kBinsPerLevel = kResidualSteps;
   // All pixels by distance, and those beyond their limits.
-  std::array<int64_t, kCounts> counts{};
-  const std::span histogram = std::span(counts).first(kBins),
-                  beyond_limits = std::span(counts).last(kBins);
+  std::array<int64_t, kBins> histogram{}, beyond_limits{};
   const uint8_t* limits = fixed_threshold > 0 ? nullptr : model.limits();
   const int frames = std::min(kFrames, snapshots.size());
-  // In pixels of the picture: all, those that the snapshots have from `kept` on, and the own ones.
-  const auto row = static_cast<size_t>(width);
-  const bool whole = band.is_whole();
-  const size_t pixels = whole ? snapshots.pixels() : row * static_cast<size_t>(band.height()),
-               kept = whole ? 0 : row * static_cast<size_t>(band.first()),
-               own = whole ? 0 : row * static_cast<size_t>(band.own_first()),
-               own_end = whole ? pixels : row * static_cast<size_t>(band.own_end());
+  const size_t pixels = snapshots.pixels();
   const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
   const size_t step = std::max<size_t>(1, (runs + kRunsPerFrame - 1) / kRunsPerFrame);
   // What each thread counts in one frame: pixels within their limits, and those beyond. That is
@@ -61,15 +53,12 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
     const size_t first_run = static_cast<size_t>(i) % step;
     pool.run((runs - std::min(runs, first_run) + step - 1) / step, [&](size_t part, size_t worker) {
       const size_t run = first_run + part * step;
-      const size_t begin = std::max(run * kMaxRun, own),
-                   end = std::min({(run + 1) * kMaxRun, pixels, own_end});
-      if (begin >= end) return;
-      const size_t first = begin - kept, count = end - begin;
+      const size_t first = run * kMaxRun, count = std::min(kMaxRun, pixels - first);
       BackgroundRun background;
       model.evaluate(first, count, background.rows);
       uint8_t counted[kMaxRun];
       std::fill_n(counted, count, uint8_t{1});
-      ignored.clear_run(begin, count, width, counted);
+      ignored.clear_run(first, count, width, counted);
       const uint8_t* x[kChannels];
       uint8_t room[kChannels][kMaxRun];
       for (int c = 0; c < kChannels; ++c)
@@ -91,7 +80,6 @@ ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, Backg
     }
   }
 
-  if (!whole) band.team()->sum(Talk::statistics, counts);
   const int64_t total = std::accumulate(histogram.begin(), histogram.end(), int64_t{0});
   ForegroundStatistics statistics;
   int64_t below = 0;

@@ -4,7 +4,6 @@
 #include "core/base/colours.h"
 #include "core/base/ignored_areas.h"
 #include "core/model/background_model.h"
-#include "core/parallel/band.h"
 #include "core/parallel/pool.h"
 
 namespace qdmd {
@@ -23,10 +22,10 @@ double automatic_threshold(double noise, Colours colours = Colours::rgb);
 // for Gaussian noise it is 1.1012 sigma (chi distribution, 3 degrees of freedom). The threshold is
 // `fixed_threshold`, or, where that is 0, the automatic one and the model's limits.
 // Leaves the model's time at the last sampled snapshot. Pixels of snapshots, `width` wide, that are
-// ignored say nothing. band: which rows of the pictures the snapshots have; by default all.
+// ignored say nothing.
 ForegroundStatistics foreground_statistics(const SnapshotRange& snapshots, BackgroundModel& model,
                                            double fixed_threshold, Pool& pool,
                                            const IgnoredAreas& ignored = {}, int width = 1,
-                                           const Band& band = {}, Colours colours = Colours::rgb);
+                                           Colours colours = Colours::rgb);
 
 }  // namespace qdmd

@@ -1,7 +1,6 @@
 // Loops over runs of a mask's samples, 255 or 0.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -26,30 +25,6 @@ inline bool copy_if_any(const uint8_t* mask, int count, uint8_t* out) {
     any |= eight;
   }
   return any != 0;
-}
-
-// A bit for each of `count` samples, from the lowest bit of a byte up; what is left of the last
-// byte is 0.
-inline void pack_mask(const uint8_t* mask, size_t count, uint8_t* bits) {
-  const auto byte_of = [&](size_t first, size_t size) {
-    unsigned byte = 0;
-    for (size_t p = 0; p < size; ++p) byte |= (mask[first + p] & 1u) << p;
-    return static_cast<uint8_t>(byte);
-  };
-  for (size_t byte = 0; byte < count / 8; ++byte) bits[byte] = byte_of(8 * byte, 8);
-  if (count % 8 > 0) bits[count / 8] = byte_of(count / 8 * 8, count % 8);
-}
-
-inline void unpack_mask(const uint8_t* bits, size_t count, uint8_t* mask) {
-  static constexpr auto kSamples = [] {
-    std::array<std::array<uint8_t, 8>, 256> samples{};
-    for (size_t byte = 0; byte < samples.size(); ++byte)
-      for (size_t p = 0; p < 8; ++p) samples[byte][p] = (byte >> p & 1) != 0 ? 255 : 0;
-    return samples;
-  }();
-  for (size_t byte = 0; byte < count / 8; ++byte)
-    std::memcpy(mask + 8 * byte, kSamples[bits[byte]].data(), 8);
-  if (count % 8 > 0) std::memcpy(mask + count / 8 * 8, kSamples[bits[count / 8]].data(), count % 8);
 }
 
 // The first of `count` samples from `from` on that is `colour`, or count.

@@ -30,10 +30,9 @@ uint32_t squared(double value) {
 
 }  // namespace
 
-MovingTexture::MovingTexture(int width, const Band& band, const DecisionConstants& constants)
+MovingTexture::MovingTexture(int width, int height, const DecisionConstants& constants)
     : constants_(constants),
-      band_(band),
-      grid_(grid_of(width, band.height(), constants)),
+      grid_(grid_of(width, height, constants)),
       row_step_(row_step_of(grid_)),
       cols_(static_cast<size_t>(width)),
       cells_(grid_.cells()),
@@ -75,21 +74,6 @@ void MovingTexture::add(size_t cell, const Sample& sample, double threshold) {
   if (frames_ > 0) count(&cells_[cell].restless, restless);
 }
 
-// Adds up what members have found in their own rows.
-void MovingTexture::share_counts() {
-  if (band_.is_whole()) return;
-  std::vector<int64_t> counts;
-  counts.reserve(3 * cells_.size());
-  for (const Cell& cell : cells_)
-    counts.insert(counts.end(), {cell.differ, cell.explained, cell.restless});
-  band_.team()->sum(Talk::textures, counts);
-  for (size_t i = 0; i < cells_.size(); ++i) {
-    cells_[i].differ = static_cast<int>(counts[3 * i]);
-    cells_[i].explained = static_cast<int>(counts[3 * i + 1]);
-    cells_[i].restless = static_cast<int>(counts[3 * i + 2]);
-  }
-}
-
 float MovingTexture::sampled_pixels(int row, int col) const {
   // Rows y < n that are multiples of the step.
   const auto below = [&](int n) { return (n + row_step_ - 1) / row_step_; };
@@ -101,7 +85,6 @@ void MovingTexture::end_frame(const uint8_t* const x[3], bool last) {
   const auto newest = [&](double most, int64_t frames) {
     return 1 / static_cast<float>(std::min(most, static_cast<double>(frames)));
   };
-  share_counts();
   const float slow = newest(constants_.average_frames, frames_ + 2);
   const float quick = newest(constants_.recent_frames, frames_ + 1);
   const float forget = 1 / static_cast<float>(constants_.forget_frames);
@@ -131,11 +114,9 @@ void MovingTexture::end_frame(const uint8_t* const x[3], bool last) {
   ++frames_;
   if (!last) return;
   const auto width = static_cast<size_t>(grid_.width);
-  const int end = band_.first() + band_.rows();
-  for (int y = (band_.first() + row_step_ - 1) / row_step_ * row_step_; y < end; y += row_step_)
+  for (int y = 0; y < grid_.height; y += row_step_)
     for (int c = 0; c < kChannels; ++c)
-      std::memcpy(before_.data() + offset(c, y),
-                  x[c] + static_cast<size_t>(y - band_.first()) * width, width);
+      std::memcpy(before_.data() + offset(c, y), x[c] + static_cast<size_t>(y) * width, width);
 }
 
 bool MovingTexture::moves_now(int row, int col) const {

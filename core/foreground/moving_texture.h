@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/foreground/decision_steps.h"
-#include "core/parallel/band.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
@@ -29,9 +28,8 @@ class MovingTexture {
     int count;
   };
 
-  // Takes all memory. For pictures of that width and a band of their rows; rows count in the
-  // picture. Members share what they find in their own ones.
-  MovingTexture(int width, const Band& band, const DecisionConstants& constants = {});
+  // Takes all memory.
+  MovingTexture(int width, int height, const DecisionConstants& constants = {});
   static uint64_t bytes(int width, int height, const DecisionConstants& constants = {});
 
   const Grid& grid() const { return grid_; }
@@ -47,8 +45,7 @@ class MovingTexture {
   const uint8_t* before(int channel, int y) const { return before_.data() + offset(channel, y); }
   // threshold: levels above which pixels differ. From any threads.
   void add(size_t cell, const Sample& sample, double threshold);
-  // After the last cell of a frame whose planes, the rows that are kept, are x. last: the next
-  // cells are of another frame.
+  // After the last cell of a frame whose planes are x. last: the next cells are of another frame.
   void end_frame(const uint8_t* const x[3], bool last = true);
   // Frames that ended.
   int64_t frames() const { return frames_; }
@@ -70,12 +67,10 @@ class MovingTexture {
     return (static_cast<size_t>(y / row_step_) * 3 + static_cast<size_t>(channel)) *
            static_cast<size_t>(grid_.width);
   }
-  void share_counts();
   float sampled_pixels(int row, int col) const;
   bool moves_now(int row, int col) const;
 
   DecisionConstants constants_;
-  Band band_;
   Grid grid_;
   int row_step_;
   std::vector<uint16_t> cols_;

@@ -6,10 +6,9 @@
 
 namespace qdmd {
 
-PixelNoise::PixelNoise(int width, int height, const DecisionConstants& constants, int first_row)
+PixelNoise::PixelNoise(int width, int height, const DecisionConstants& constants)
     : width_(static_cast<size_t>(width)),
       height_(height),
-      first_row_(first_row),
       most_samples_(constants.noise_samples),
       weight_of_moments_(constants.weight_of_moments),
       mean_(width_ * static_cast<size_t>(height), 0),

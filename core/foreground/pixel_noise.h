@@ -17,8 +17,8 @@ namespace qdmd {
 // seldom for that.
 class PixelNoise {
  public:
-  // Takes all memory. For width x height pixels of pictures, from row first_row on.
-  PixelNoise(int width, int height, const DecisionConstants& constants = {}, int first_row = 0);
+  // Takes all memory.
+  PixelNoise(int width, int height, const DecisionConstants& constants = {});
   static uint64_t bytes(int width, int height);
 
   // Begins afresh.
@@ -26,7 +26,7 @@ class PixelNoise {
   // The noise of a row of pixels.
   uint16_t* row(int y) { return mean_.data() + static_cast<size_t>(y) * width_; }
   // One row in a few of a frame says enough, other rows of each frame.
-  bool learns_from(int y) const { return (first_row_ + y + frames_) % kRows == 0; }
+  bool learns_from(int y) const { return (y + frames_) % kRows == 0; }
   // Before the next frame's mask takes the place of this one, width * height samples.
   void remember(const uint8_t* mask);
   // Learns from pixels left .. left + count - 1 of such a row. squared: squared distances; limit:
@@ -41,7 +41,7 @@ class PixelNoise {
   static constexpr int kRows = 8;
 
   size_t width_;
-  int height_, first_row_;
+  int height_;
   double most_samples_, weight_of_moments_;
   NoiseRates rates_;
   int64_t frames_ = 0;

@@ -20,9 +20,11 @@ ChromaShape shape_of(int width, int height, const FrameContents& contents) {
   return {width, height, contents.chroma_columns, contents.chroma_rows};
 }
 
-// Samples of a channel of the own rows.
-size_t samples_of(const Band& band, int width, int step) {
-  return static_cast<size_t>(band.samples(step)) * sample_count(width, step);
+// Samples of a channel.
+size_t samples_of(int width, int height, const FrameContents& contents) {
+  const int step = contents.sample_step;
+  return static_cast<size_t>((height - contents.first_sample + step - 1) / step) *
+         sample_count(width, step);
 }
 
 // Samples of a row that are worked on beside the planes.
@@ -48,12 +50,12 @@ void take_rows(const uint8_t* from, const Spacing& at, SampleBits bits, int firs
 
 }  // namespace
 
-FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameContents& contents,
+FrameStore::FrameStore(int capacity, int width, int height, const FrameContents& contents,
                        uint64_t most_bytes)
-    : band_(band),
-      width_(width),
-      height_(band.rows()),
+    : width_(width),
+      height_(height),
       sample_step_(contents.sample_step),
+      first_sample_(contents.first_sample),
       most_bytes_(most_bytes),
       rgb_(contents.rgb),
       planes_(capacity, shape_of(width, height_, contents), contents.depth),
@@ -62,26 +64,22 @@ FrameStore::FrameStore(int capacity, int width, const Band& band, const FrameCon
       varies_(static_cast<size_t>(capacity), 0),
       poses_(static_cast<size_t>(capacity)) {
   if (sample_step_ > 1)
-    samples_ = PlaneSlots(capacity, samples_of(band, width, sample_step_), contents.depth);
+    samples_ = PlaneSlots(capacity, samples_of(width, height, contents), contents.depth);
   if (contents.cells_along > 0) {
-    grid_ = Grid(width, band.height(), contents.cells_along);
+    grid_ = Grid(width, height, contents.cells_along);
     cells_ = GridFrames(grid_, capacity);
-    if (!band.is_whole()) to_share_.resize(static_cast<size_t>(capacity), 0);
   }
 }
 
-uint64_t FrameStore::bytes(int capacity, int width, const Band& band,
-                           const FrameContents& contents) {
-  uint64_t bytes =
-      PlaneSlots::bytes(capacity, shape_of(width, band.rows(), contents), contents.depth);
+uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
+  uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents), contents.depth);
   const auto of_alpha = static_cast<size_t>(sample_bytes(contents.depth));
   uint64_t beside = (of_alpha + 1 + sizeof(Pose)) * static_cast<uint64_t>(capacity) +
                     spread_size(width, contents);
   if (contents.sample_step > 1)
-    beside +=
-        PlaneSlots::bytes(capacity, samples_of(band, width, contents.sample_step), contents.depth);
+    beside += PlaneSlots::bytes(capacity, samples_of(width, height, contents), contents.depth);
   if (contents.cells_along > 0)
-    beside += GridFrames::bytes(Grid(width, band.height(), contents.cells_along), capacity);
+    beside += GridFrames::bytes(Grid(width, height, contents.cells_along), capacity);
   if (__builtin_add_overflow(bytes, beside, &bytes)) return std::numeric_limits<uint64_t>::max();
   return bytes;
 }
@@ -111,26 +109,11 @@ void FrameStore::take_contents(int slot, Pool* pool) {
     samples_.pad(slot);
     const MutableSamples to[] = {samples_.samples(slot, 0), samples_.samples(slot, 1),
                                  samples_.samples(slot, 2)};
-    take_samples(picture, width_,
-                 {band_.first_sample(sample_step_) - band_.first(), band_.own_end() - band_.first(),
-                  sample_step_},
-                 spread_.data(), to);
+    take_samples(picture, width_, {first_sample_, height_, sample_step_}, spread_.data(), to);
   }
   if (cells_.cells() == 0) return;
-  find_own_cells(grid_, band_, picture, &cells_, slot, pool);
+  find_cells(grid_, picture, &cells_, slot, pool);
   rgb_.convert(cells_.cells(), cells_.channels(slot).data());
-  if (band_.is_whole()) return;
-  to_share_[static_cast<size_t>(slot)] = 1;
-  any_to_share_ = true;
-}
-
-const GridFrames& FrameStore::cells() const {
-  if (!any_to_share_) return cells_;
-  for (size_t slot = 0; slot < to_share_.size(); ++slot)
-    if (std::exchange(to_share_[slot], 0))
-      share_cells(grid_, band_, &cells_, static_cast<int>(slot));
-  any_to_share_ = false;
-  return cells_;
 }
 
 bool FrameStore::unshare(uint64_t beside) {

@@ -8,7 +8,6 @@
 #include "core/align/pose.h"
 #include "core/align/resampler.h"
 #include "core/base/image_view.h"
-#include "core/parallel/band.h"
 #include "core/passes/grid.h"
 #include "core/passes/rgb_colours.h"
 #include "core/planes/snapshot_range.h"
@@ -22,23 +21,23 @@ struct FrameContents {
   // Pixels that share a sample of channels 1 and 2 in all frames (ChromaShape): such samples are
   // kept once. 1: whatever frames share, each pixel has its own.
   int chroma_columns = 1, chroma_rows = 1;
-  int depth = 8;  // bits of the frames' samples, 8 to 16. Cells are of the highest eight
+  int depth = 8;         // bits of the frames' samples, 8 to 16. Cells are of the highest eight
+  int first_sample = 0;  // the row that has the first sample of sample_step
   RgbColours rgb = {};
 };
 
 // The newest `capacity` frames of width x height pixels: planes, samples, cells, alpha. Everything
-// of a frame is in the slot that append() names. In a band, planes and alpha have the rows that are
-// kept, samples are the own ones, and cells those of the whole picture, which members share.
+// of a frame is in the slot that append() names.
 class FrameStore {
  public:
   FrameStore() = default;
   // Takes all memory but that for alpha that varies, which append() may take once, `most_bytes` in
   // all at most. Throws std::bad_alloc.
-  FrameStore(int capacity, int width, const Band& band, const FrameContents& contents,
+  FrameStore(int capacity, int width, int height, const FrameContents& contents,
              uint64_t most_bytes = UINT64_MAX);
 
   // The bytes that such a store takes, without alpha that varies.
-  static uint64_t bytes(int capacity, int width, const Band& band, const FrameContents& contents);
+  static uint64_t bytes(int capacity, int width, int height, const FrameContents& contents);
   // The bytes that it has taken.
   uint64_t bytes() const;
   // These, and those of alpha that varies.
@@ -60,8 +59,7 @@ class FrameStore {
   void clear() { planes_.clear(); }
 
   int width() const { return width_; }
-  int height() const { return height_; }  // rows that are kept
-  const Band& band() const { return band_; }
+  int height() const { return height_; }
   int capacity() const { return planes_.capacity(); }
   // Frames held, in the order in which they came.
   const Window& window() const { return planes_; }
@@ -74,9 +72,7 @@ class FrameStore {
   // By slot. Every sample_step-th pixel in x and y: the planes themselves where the step is 1.
   const PlaneSlots& samples() const { return sample_step_ > 1 ? samples_ : planes_; }
   const Grid& grid() const { return grid_; }
-  // The members of a team call this alike: what each found since the last call becomes everybody's
-  // here, so that no member waits for others with each frame.
-  const GridFrames& cells() const;
+  const GridFrames& cells() const { return cells_; }
   // Samples of alpha in row order, or none where all are constant_alpha(), which is in units of the
   // lowest bit.
   Samples alpha(int slot) const;
@@ -104,18 +100,14 @@ class FrameStore {
   void take_contents(int slot, Pool* pool);
   bool unshare(uint64_t beside);
 
-  Band band_;
-  int width_ = 0, height_ = 0, sample_step_ = 1;
+  int width_ = 0, height_ = 0, sample_step_ = 1, first_sample_ = 0;
   uint64_t most_bytes_ = UINT64_MAX, frames_taken_ = 0;
   RgbColours rgb_;
   Window planes_;
   PlaneSlots samples_;
 
   Grid grid_;
-  // Only those of a band are to be shared: others do not change by being looked at.
-  mutable GridFrames cells_;
-  mutable std::vector<uint8_t> to_share_;
-  mutable bool any_to_share_ = false;
+  GridFrames cells_;
   // Chroma of the newest frame, a sample for each pixel, where something is made of it.
   std::vector<uint8_t> spread_;
   // Video with alpha is nearly always opaque: its planes are kept only once one varies.

@@ -90,26 +90,24 @@ void SlidingGram::list_planes(const SnapshotRange& span) {
   }
 }
 
-void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length,
-                            bool begins) {
+void SlidingGram::add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
   make_room();
   list_planes(span);
   // Each snapshot needs those up to itself only: what comes after is the mirror image.
   for (int start = span.size() - count; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
     multiply(end - start, end, first, length);
-    store(span, start, end, begins);
+    store(span, start, end, first == 0);
   }
 }
 
-void SlidingGram::add_rows(const SnapshotRange& span, int frames, int first, int count,
-                           bool begins) {
+void SlidingGram::add_rows(const SnapshotRange& span, int frames, int first, int count) {
   make_room();
   list_planes(span);
   for (int start = span.size() - frames; start < span.size(); start += kRowSnapshots) {
     const int end = std::min(start + kRowSnapshots, span.size());
     multiply_rows(end - start, end, first, count);
-    store(span, start, end, begins);
+    store(span, start, end, first == 0);
   }
 }
 
@@ -220,9 +218,8 @@ IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots) const {
   return gram;
 }
 
-IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots, Team* team) const {
+IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots, const Add& add) const {
   IntegerMatrix gram = matrix(snapshots);
-  if (!team) return gram;
   // What lies above the diagonal is the mirror image. A snapshot at a time: there is no second
   // matrix.
   const Eigen::Index size = gram.cols();
@@ -232,7 +229,7 @@ IntegerMatrix SlidingGram::matrix(const SnapshotRange& snapshots, Team* team) co
     const auto block = std::span(values).first(static_cast<size_t>(kChannels * below));
     Eigen::Map<IntegerMatrix> sums(block.data(), below, kChannels);
     sums = gram.block(t, t, below, kChannels);
-    team->sum(Talk::products, block);
+    add(block);
     gram.block(t, t, below, kChannels) = sums;
     gram.block(t, t, kChannels, below) = sums.transpose();
   }

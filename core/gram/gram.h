@@ -2,13 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/gram/kernel.h"
 #include "core/gram/shared_chroma.h"
 #include "core/parallel/pool.h"
-#include "core/parallel/team.h"
 #include "core/planes/snapshot_range.h"
 #include "core/quaternion/matrix.h"
 
@@ -46,25 +47,16 @@ class SlidingGram {
   // that begins at pixel 0 comes first and forgets the group's old products; the others follow in
   // any order and size. The group's elements of matrix() are valid once its slices have covered
   // every pixel once. Between slices, other frames may be appended.
-  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length) {
-    add_slice(span, count, first, length, first == 0);
-  }
-  // add_slice() for planes of which another pixel is the first that counts. begins: this slice has
-  // it.
-  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length, bool begins);
+  void add_slice(const SnapshotRange& span, int count, size_t first, size_t length);
   // add_slice() for snapshots of the shape, as far as the pixels of chroma rows first .. first +
-  // count
-  // - 1 contribute: the products of all pixels, as if chroma had been spread to them.
-  void add_rows(const SnapshotRange& span, int frames, int first, int count) {
-    add_rows(span, frames, first, count, first == 0);
-  }
-  // add_rows() for planes of which another row is the first that counts. begins: this call has it.
-  void add_rows(const SnapshotRange& span, int frames, int first, int count, bool begins);
+  // count - 1 contribute: the products of all pixels, as if chroma had been spread to them.
+  void add_rows(const SnapshotRange& span, int frames, int first, int count);
 
   // The matrix in time order, 3 size x 3 size.
   IntegerMatrix matrix(const SnapshotRange& snapshots) const;
-  // Summed over all members of a team, whose planes have the other pixels; null: there are none.
-  IntegerMatrix matrix(const SnapshotRange& snapshots, Team* team) const;
+  // Of pictures of which others have the other rows: add makes numbers those of all, added up.
+  using Add = std::function<void(std::span<int64_t>)>;
+  IntegerMatrix matrix(const SnapshotRange& snapshots, const Add& add) const;
 
  private:
   size_t threads() const { return pool_ ? pool_->threads() : 1; }

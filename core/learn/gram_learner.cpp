@@ -1,6 +1,7 @@
 #include "core/learn/gram_learner.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/dmd/qdmd.h"
 #include "core/model/build_spread.h"
@@ -32,11 +33,10 @@ void put_in_levels(int depth, DmdSummary* summary) {
 
 }  // namespace
 
-GramLearner::GramLearner(const LearnOptions& options, int width, const Band& band)
+GramLearner::GramLearner(const LearnOptions& options, int width, int height)
     : options_(options),
-      band_(band),
       width_(width),
-      height_(band.rows()),
+      height_(height),
       step_(options.sample_step > 0 ? options.sample_step : kChosenStep) {}
 
 // Solvers that read pixels want each to have its own samples.
@@ -47,8 +47,14 @@ bool GramLearner::keeps_shared() const {
 }
 
 FrameContents GramLearner::contents() const {
-  if (!keeps_shared()) return {step_, 0, 1, 1, options_.depth};
-  return {step_, 0, options_.chroma_columns, options_.chroma_rows};
+  FrameContents contents;
+  contents.sample_step = step_;
+  contents.first_sample = (step_ - options_.first_row % step_) % step_;
+  contents.depth = options_.depth;
+  if (!keeps_shared()) return contents;
+  contents.chroma_columns = options_.chroma_columns;
+  contents.chroma_rows = options_.chroma_rows;
+  return contents;
 }
 
 uint64_t GramLearner::bytes(int window_size, int capacity, Models models, int threads) const {
@@ -108,9 +114,8 @@ uint64_t GramLearner::solver_bytes(int window_size) const {
   return static_cast<uint64_t>(adjoint_bytes(pixels_seen(), window_size));
 }
 
-// By the decomposition, those of other members included.
 double GramLearner::pixels_seen() const {
-  return static_cast<double>(sample_count(width_, band_.height(), step_));
+  return static_cast<double>(sample_count(width_, height_, step_));
 }
 
 void GramLearner::begin(const LearnerRoom& room) {
@@ -132,27 +137,15 @@ void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
   const Clock::Span span_of_time(*room_.clock, Clock::products);
   const SnapshotRange columns = columns_of(span);
   if (shares_chroma()) {
-    // Bands begin and end with them.
-    const int together = columns.shape().rows, before = band_.own_begin() / together;
-    const auto rows = static_cast<size_t>((band_.own_rows() + together - 1) / together);
+    const auto rows = static_cast<size_t>(columns.shape().chroma_height());
     const size_t first = slice.first(rows, 1), count = slice.size(rows, 1);
     // The first slice begins a group, however thin it is.
     if (slice.index == 0 || count > 0)
-      gram_.add_rows(columns, frames, before + static_cast<int>(first), static_cast<int>(count),
-                     slice.index == 0);
+      gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
     return;
   }
-  if (band_.is_whole()) {
-    gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
-                    slice.size(columns.plane_size(), kUnit));
-    return;
-  }
-  // Other members answer for the rows around.
-  const auto row = static_cast<size_t>(width_);
-  const size_t before = step_ > 1 ? 0 : static_cast<size_t>(band_.own_begin()) * row;
-  const size_t own = step_ > 1 ? columns.pixels() : static_cast<size_t>(band_.own_rows()) * row;
-  gram_.add_slice(columns, frames, before + slice.first(own, kUnit), slice.size(own, kUnit),
-                  slice.index == 0);
+  gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
+                  slice.size(columns.plane_size(), kUnit));
 }
 
 void GramLearner::decompose(const SnapshotRange& snapshots) {
@@ -161,11 +154,14 @@ void GramLearner::decompose(const SnapshotRange& snapshots) {
   {
     const Clock::Span span_of_time(*room_.clock, Clock::solving);
     const SnapshotRange columns = columns_of(snapshots);
+    auto pixels = static_cast<int64_t>(columns.pixels());
+    if (options_.add) options_.add({&pixels, 1});
+    // What a decomposition no longer needs of it, it gives back.
+    IntegerMatrix gram = options_.add ? gram_.matrix(columns, options_.add) : gram_.matrix(columns);
     Decomposition decomposition =
         options_.method == Method::dmd
-            ? decompose_channels(gram_.matrix(columns, band_.team()), options_.dmd)
-            : qdmd::decompose(columns, gram_.matrix(columns, band_.team()), options_.dmd,
-                              pixels_seen());
+            ? decompose_channels(gram, options_.dmd)
+            : qdmd::decompose(columns, std::move(gram), options_.dmd, static_cast<double>(pixels));
     decomposed_ = {};
     decomposed_.dmd = decomposition.summary;
     put_in_levels(options_.depth, &decomposed_.dmd);
@@ -196,8 +192,8 @@ void GramLearner::build(Slice slice, BackgroundModel* model) {
   }
   const auto parts = static_cast<int>(std::max<size_t>(1, length / kPixelsPerPart));
   room_.pool->run(static_cast<size_t>(parts), [&](size_t part) {
-    const Slice band = {static_cast<int>(part), parts};
-    model->build_slice(first + band.first(length, kUnit), band.size(length, kUnit));
+    const Slice piece = {static_cast<int>(part), parts};
+    model->build_slice(first + piece.first(length, kUnit), piece.size(length, kUnit));
   });
 }
 

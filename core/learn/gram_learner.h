@@ -13,7 +13,7 @@ namespace qdmd {
 // 1 on their Gram matrix, then the modes' pictures.
 class GramLearner : public Learner {
  public:
-  GramLearner(const LearnOptions& options, int width, const Band& band);
+  GramLearner(const LearnOptions& options, int width, int height);
 
   FrameContents contents() const override;
   std::vector<int> sample_steps() const override { return {step_}; }
@@ -37,7 +37,6 @@ class GramLearner : public Learner {
   double pixels_seen() const;
 
   LearnOptions options_;
-  Band band_;
   int width_, height_, step_;
   LearnerRoom room_ = {};
   SlidingGram gram_;

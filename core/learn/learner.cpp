@@ -5,11 +5,11 @@
 
 namespace qdmd {
 
-std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, const Band& band) {
+std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, int height) {
   check_steps();
   if (options.method == Method::robust)
-    return std::make_unique<RobustLearner>(options, width, band);
-  return std::make_unique<GramLearner>(options, width, band);
+    return std::make_unique<RobustLearner>(options, width, height);
+  return std::make_unique<GramLearner>(options, width, height);
 }
 
 std::span<const char* const> options_without_effect(Method method) {

@@ -14,7 +14,6 @@
 #include "core/learn/uncovered.h"
 #include "core/model/background_model.h"
 #include "core/model/learnt.h"
-#include "core/parallel/band.h"
 #include "core/parallel/pool.h"
 #include "core/passes/bands.h"
 
@@ -59,9 +58,8 @@ struct LearnerRoom {
 // May throw std::bad_alloc; what was under way is lost then.
 class Learner {
  public:
-  // That of options.method, for frames of that width and a band of their rows. Takes no memory for
-  // them yet.
-  static std::unique_ptr<Learner> make(const LearnOptions& options, int width, const Band& band);
+  // That of options.method, for frames of that size. Takes no memory for them yet.
+  static std::unique_ptr<Learner> make(const LearnOptions& options, int width, int height);
   virtual ~Learner() = default;
 
   // ---- What it needs ----

@@ -27,15 +27,15 @@ struct Slice {
   }
 };
 
-// Calls band(first, size, worker) for bands of about equal size that cover [0, length), `count` of
+// Calls work(first, size, worker) for bands of about equal size that cover [0, length), `count` of
 // them, on the pool's threads (Pool::run).
-template <typename Band>
-void for_bands(Pool& pool, int length, int count, Band band) {
+template <typename Work>
+void for_bands(Pool& pool, int length, int count, Work work) {
   pool.run(static_cast<size_t>(count), [&](size_t part, size_t worker) {
     const auto boundary = [&](size_t i) {
       return static_cast<int>(int64_t{length} * static_cast<int64_t>(i) / count);
     };
-    band(boundary(part), boundary(part + 1) - boundary(part), worker);
+    work(boundary(part), boundary(part + 1) - boundary(part), worker);
   });
 }
 
@@ -45,15 +45,15 @@ inline constexpr size_t kWorthAThread = 16384;
 inline bool is_shared_out(size_t pixels) { return pixels >= 2 * kWorthAThread; }
 
 // for_bands() for `pixels` pixels in all, on as many threads as that is worth; on the caller's
-// where the pool is null. band(first, size).
-template <typename Band>
-void for_rows(Pool* pool, int length, size_t pixels, Band band) {
+// where the pool is null. work(first, size).
+template <typename Work>
+void for_rows(Pool* pool, int length, size_t pixels, Work work) {
   const auto most = static_cast<size_t>(std::max(length, 1));
   const auto count = static_cast<int>(std::clamp<size_t>(pixels / kWorthAThread, 1, most));
   if (pool && count > 1)
-    for_bands(*pool, length, count, [&](int first, int size, size_t) { band(first, size); });
+    for_bands(*pool, length, count, [&](int first, int size, size_t) { work(first, size); });
   else
-    band(0, length);
+    work(0, length);
 }
 
 }  // namespace qdmd

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <span>
 
 #include "core/passes/bands.h"
 
@@ -123,11 +122,9 @@ Grid::Grid(int width_, int height_, int cells_along) : width(width_), height(hei
 
 namespace {
 
-// The samples of a plane, which `columns` x `rows` pixels share; it begins with row `top` of the
-// picture.
+// The samples of a plane, which `columns` x `rows` pixels share.
 struct PlaneSamples {
   const uint8_t* plane;
-  int top = 0;
   int columns = 1, rows = 1;
 };
 
@@ -201,7 +198,7 @@ void means_of_rows(const Grid& grid, const Columns& columns, int first_row, int 
   const size_t cols = columns.cols();
   const auto shared = static_cast<uint64_t>(samples.columns);
   for (int row = first_row; row < end_row; ++row, means += cols) {
-    const int top = grid.top(row) - samples.top, bottom = grid.top(row + 1) - samples.top;
+    const int top = grid.top(row), bottom = grid.top(row + 1);
     for (size_t first = 0, end; first < cols; first = end) {
       const int left = columns.begin(first);
       end = columns.all() <= kColumns ? cols : first;
@@ -240,45 +237,26 @@ void means_of_rows(const Grid& grid, const Columns& columns, int first_row, int 
   }
 }
 
-// The row of cells that begins with row `top` of the picture.
-int row_at(const Grid& grid, int top) {
-  return static_cast<int>((int64_t{top} * grid.rows + grid.height - 1) / grid.height);
-}
-
 }  // namespace
 
 void cell_means(const Grid& grid, const uint8_t* plane, float* means) {
   means_of_rows(grid, Columns(grid, 1), 0, grid.rows, {plane}, means);
 }
 
-void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame, Pool* pool) {
-  const int own = row_at(grid, band.own_first()), rows = row_at(grid, band.own_end()) - own;
-  const size_t pixels =
-      static_cast<size_t>(grid.width) * static_cast<size_t>(grid.top(own + rows) - grid.top(own));
+void find_cells(const Grid& grid, const KeptPicture& picture, GridFrames* cells, int frame,
+                Pool* pool) {
+  const size_t pixels = static_cast<size_t>(grid.width) * static_cast<size_t>(grid.height);
   const bool shares = picture.shape.is_shared();
   const Columns own_samples(grid, 1), shared_ones(grid, shares ? picture.shape.columns : 1);
-  for_rows(pool, rows, pixels, [&](int at, int count) {
-    const int first = own + at;
+  for_rows(pool, grid.rows, pixels, [&](int first, int count) {
     for (int c = 0; c < kChannels; ++c) {
-      PlaneSamples samples = {picture.plane(c), band.first()};
+      PlaneSamples samples = {picture.plane(c)};
       const bool shared = c > 0 && shares;
       if (shared) samples.columns = picture.shape.columns, samples.rows = picture.shape.rows;
       means_of_rows(grid, shared ? shared_ones : own_samples, first, first + count, samples,
                     cells->plane(frame, c) + ptrdiff_t{first} * grid.cols);
     }
   });
-}
-
-void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame) {
-  if (band.is_whole()) return;
-  std::vector<size_t> ends;
-  for (int rank = 0; rank < band.members(); ++rank)
-    ends.push_back(sizeof(float) * static_cast<size_t>(row_at(grid, band.end_of(rank))) *
-                   static_cast<size_t>(grid.cols));
-  for (int c = 0; c < kChannels; ++c)
-    band.team()->share(
-        Talk::cells, std::as_writable_bytes(std::span(cells->plane(frame, c), grid.cells())), ends);
 }
 
 }  // namespace qdmd

@@ -8,7 +8,6 @@
 
 #include "core/base/channels.h"
 #include "core/base/large_vector.h"
-#include "core/parallel/band.h"
 #include "core/parallel/pool.h"
 #include "core/planes/kept_picture.h"
 
@@ -109,12 +108,8 @@ class GridPicture {
 // The mean of each cell of a plane of grid.width * grid.height samples.
 void cell_means(const Grid& grid, const uint8_t* plane, float* means);
 
-// cell_means() of all channels of a picture into picture `frame` of `cells`, where the picture has
-// the band's rows only: the cells of its own rows. Bands end where rows of cells do, and never
-// between pixels that share a sample. pool may be null.
-void find_own_cells(const Grid& grid, const Band& band, const KeptPicture& picture,
-                    GridFrames* cells, int frame, Pool* pool);
-// All members have the cells that each of them found, for good.
-void share_cells(const Grid& grid, const Band& band, GridFrames* cells, int frame);
+// cell_means() of all channels of a picture into picture `frame` of `cells`. pool may be null.
+void find_cells(const Grid& grid, const KeptPicture& picture, GridFrames* cells, int frame,
+                Pool* pool);
 
 }  // namespace qdmd

@@ -194,7 +194,6 @@ size_t mask_rows(size_t width, int height) {
 }
 
 constexpr int kMeanReach = 2, kMajorityReach = 3;  // pixels around one that judge it with it
-static_assert(kMeanReach + kMajorityReach == kMaskReach);
 
 // Repeats the first and the last of `width` samples that begin at padded[reach].
 void pad_ends(size_t width, size_t reach, uint8_t* padded) {

@@ -32,9 +32,6 @@ inline bool is_masked(const uint8_t* bits, size_t pixel) {
   return (bits[pixel / 8] >> (pixel % 8) & 1) != 0;
 }
 
-// A pixel's mask depends on rows so far from it, of the reference and the frame.
-constexpr int kMaskReach = 5;
-
 // The mask of a frame: its residual, averaged over 5 x 5 pixels, exceeds the threshold in most of
 // the 7 x 7 pixels around; the border's pixels stand for those outside. x: the frame's planes.
 // scratch: mask_scratch_bytes() at an even address, which can serve many calls; threads run this,

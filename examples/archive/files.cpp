@@ -1,14 +1,20 @@
 #include "examples/archive/files.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
+#include <iterator>
 #include <stdexcept>
+#include <thread>
+#include <tuple>
+#include <utility>
 
 namespace qdmd::archive {
 namespace {
@@ -36,34 +42,55 @@ void give_name(const std::string& path) {
   synchronize(folder, O_RDONLY | O_DIRECTORY);
 }
 
-std::string progress_of(const std::string& path) { return path + ".progress"; }
-
-std::optional<Progress> read_progress(const std::string& path) {
+std::optional<std::string> read_file(const std::string& path) {
   std::ifstream file(path);
   if (!file) return std::nullopt;
-  try {
-    const auto json = nlohmann::json::parse(file);
-    return Progress{json.at("settings"), json.at("windows"), json.at("frames"), json.at("ended"),
-                    json.value("joined", false)};
-  } catch (const nlohmann::json::exception&) {
-    throw std::runtime_error(path +
-                             " is not the progress of qdmd-archive: remove it to begin anew");
-  }
+  return std::string{std::istreambuf_iterator<char>(file), {}};
 }
 
-void write_progress(const std::string& path, const Progress& progress) {
+void write_file(const std::string& path, const std::string& text) {
   {
     std::ofstream file(temporary_of(path));
-    file << nlohmann::json{{"settings", progress.settings},
-                           {"windows", progress.windows},
-                           {"frames", progress.frames},
-                           {"ended", progress.ended},
-                           {"joined", progress.joined}}
-                .dump(2)
-         << '\n';
+    file << text;
     if (!file.flush()) throw std::runtime_error(path + " cannot be written: is the disk full?");
   }
   give_name(path);
+}
+
+LockedFile::LockedFile(LockedFile&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+
+LockedFile::~LockedFile() {
+  if (file_ >= 0) close(file_);
+}
+
+std::optional<LockedFile> LockedFile::take(const std::string& path) {
+  const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (file < 0 && errno == ENOENT) return std::nullopt;
+  if (file < 0) throw std::runtime_error(path + " cannot be written: " + std::strerror(errno));
+  LockedFile locked(file);
+  if (flock(file, LOCK_EX | LOCK_NB) == 0) {
+    // Whoever had it may have removed it.
+    struct stat here, there;
+    if (fstat(file, &here) != 0 || stat(path.c_str(), &there) != 0 || here.st_ino != there.st_ino)
+      return std::nullopt;
+    locked.write("");
+    return locked;
+  }
+  if (errno == EWOULDBLOCK || errno == EINTR) return std::nullopt;
+  throw std::runtime_error(path + " cannot be locked (" + std::strerror(errno) +
+                           "): this folder's file system has no locks");
+}
+
+LockedFile LockedFile::wait_for(const std::string& path) {
+  for (;;) {
+    if (auto locked = take(path)) return std::move(*locked);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+void LockedFile::write(const std::string& text) {
+  // Nobody depends on it.
+  if (ftruncate(file_, 0) == 0) std::ignore = pwrite(file_, text.data(), text.size(), 0);
 }
 
 }  // namespace qdmd::archive

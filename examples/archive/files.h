@@ -1,7 +1,6 @@
-// Files that are whole or not there, and what a job has done so far.
+// Files that are whole or not there, and files that one process holds.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -12,20 +11,29 @@ std::string temporary_of(const std::string& path);
 // The file at temporary_of(path), which nobody writes any more, is on the disk and then has its
 // name. Throws std::runtime_error.
 void give_name(const std::string& path);
+// All of a small file. Nothing: it is not there. Writing throws std::runtime_error.
+std::optional<std::string> read_file(const std::string& path);
+void write_file(const std::string& path, const std::string& text);
 
-// What is finished. It is written once the files of a window have their names, so that a job that
-// is killed at any moment goes on after the last window that is whole.
-struct Progress {
-  std::string settings;  // what the files depend on; another job's are not gone on with
-  int64_t windows = 0, frames = 0;
-  bool ended = false;   // no frame is left; the videos of windows are to be joined
-  bool joined = false;  // they are, and what they were made of may be gone
+// A file that is locked as long as this lives and the process does, on whatever machine.
+class LockedFile {
+ public:
+  LockedFile(LockedFile&& other) noexcept;
+  LockedFile& operator=(LockedFile&&) = delete;
+  ~LockedFile();
+
+  // Nothing: another process has it, or its folder is gone. Throws std::runtime_error where files
+  // cannot be locked.
+  static std::optional<LockedFile> take(const std::string& path);
+  // Waits for it.
+  static LockedFile wait_for(const std::string& path);
+  // What others may read meanwhile.
+  void write(const std::string& text);
+
+ private:
+  explicit LockedFile(int file) : file_(file) {}
+
+  int file_;
 };
-
-// Beside the first output.
-std::string progress_of(const std::string& path);
-// Nothing where there is no such file. Throws std::runtime_error where the file is something else.
-std::optional<Progress> read_progress(const std::string& path);
-void write_progress(const std::string& path, const Progress& progress);
 
 }  // namespace qdmd::archive

@@ -6,21 +6,20 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <mutex>
 #include <stdexcept>
+#include <utility>
 
 #include "examples/archive/picture_file.h"
+#include "gst/gstqdmdelement.h"
 
 namespace qdmd::archive {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Crops begin and end at such rows, and so many rows away from those that are wanted: chroma that
-// rows share is then converted as in the whole picture.
-constexpr int kAround = 16;
 
 std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -43,11 +42,26 @@ std::string fraction_of(double rate) {
   return std::to_string(numerator) + "/" + std::to_string(denominator);
 }
 
-// In what frames like these are kept: all of their colours, as the element takes them. Of pictures,
-// which may be grey now and then: colour ones.
+bool takes(GstVideoFormat format) {
+  static const CapsPtr caps(gst_caps_from_string(QDMD_CAPS));
+  const CapsPtr one(gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
+                                        gst_video_format_to_string(format), nullptr));
+  return gst_caps_can_intersect(one.get(), caps.get()) != FALSE;
+}
+
+// In what frames like these are kept: as they are, where the element takes that, else without loss.
+// Of pictures, which may be grey now and then: colour ones of 8 bits.
 GstVideoFormat kept_format(const GstVideoInfo& info, bool pictures) {
-  if (GST_VIDEO_INFO_IS_GRAY(&info) && !pictures) return GST_VIDEO_FORMAT_GRAY8;
-  if (!GST_VIDEO_INFO_IS_YUV(&info)) return GST_VIDEO_FORMAT_BGRx;
+  const bool is_grey = GST_VIDEO_INFO_IS_GRAY(&info), is_yuv = GST_VIDEO_INFO_IS_YUV(&info);
+  if (pictures && !is_yuv) return GST_VIDEO_FORMAT_BGRx;
+  if (takes(GST_VIDEO_INFO_FORMAT(&info))) return GST_VIDEO_INFO_FORMAT(&info);
+  const bool deep = GST_VIDEO_INFO_COMP_DEPTH(&info, 0) > 8;
+  if (is_grey) return deep ? GST_VIDEO_FORMAT_GRAY16_LE : GST_VIDEO_FORMAT_GRAY8;
+  if (!is_yuv) {
+    if (deep) return GST_VIDEO_FORMAT_ARGB64;
+    return GST_VIDEO_INFO_HAS_ALPHA(&info) ? GST_VIDEO_FORMAT_BGRA : GST_VIDEO_FORMAT_BGRx;
+  }
+  if (deep) return GST_VIDEO_FORMAT_Y444_16LE;
   if (GST_VIDEO_FORMAT_INFO_W_SUB(info.finfo, 1) != 1) return GST_VIDEO_FORMAT_Y444;
   return GST_VIDEO_FORMAT_INFO_H_SUB(info.finfo, 1) == 1 ? GST_VIDEO_FORMAT_I420
                                                          : GST_VIDEO_FORMAT_Y42B;
@@ -57,29 +71,30 @@ CharsPtr text_of(const GstVideoColorimetry& colours) {
   return CharsPtr(gst_video_colorimetry_to_string(&colours));
 }
 
-// What pictures of the size and colours of `info` are, in frames of that format.
-GstVideoInfo picture_info(const GstVideoInfo& info, GstVideoFormat format) {
-  GstVideoInfo picture;
-  gst_video_info_set_format(&picture,
-                            format == GST_VIDEO_FORMAT_BGRx ? GST_VIDEO_FORMAT_RGB : format,
-                            static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info)),
-                            static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info)));
+// What frames become in that format.
+GstVideoInfo kept_info(const GstVideoInfo& seen, GstVideoFormat format, double rate) {
+  GstVideoInfo kept;
+  // Two fields are taken as the frame that they are in.
+  gst_video_info_set_format(&kept, format, static_cast<guint>(GST_VIDEO_INFO_WIDTH(&seen)),
+                            static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&seen)));
   // Grey ones that become R, G and B have those of R, G and B.
-  if (GST_VIDEO_INFO_IS_RGB(&picture) == GST_VIDEO_INFO_IS_RGB(&info))
-    picture.colorimetry = info.colorimetry;
-  picture.chroma_site = info.chroma_site;
-  picture.interlace_mode = info.interlace_mode;
-  GST_VIDEO_INFO_FIELD_ORDER(&picture) = GST_VIDEO_INFO_FIELD_ORDER(&info);
-  picture.par_n = info.par_n;
-  picture.par_d = info.par_d;
-  return picture;
+  if (GST_VIDEO_INFO_IS_RGB(&kept) == GST_VIDEO_INFO_IS_RGB(&seen))
+    kept.colorimetry = seen.colorimetry;
+  kept.chroma_site = seen.chroma_site;
+  kept.par_n = seen.par_n;
+  kept.par_d = seen.par_d;
+  kept.fps_n = seen.fps_n;
+  kept.fps_d = seen.fps_d;
+  if (seen.fps_n <= 0) gst_util_double_to_fraction(rate, &kept.fps_n, &kept.fps_d);
+  return kept;
 }
 
 // What all frames are converted to.
-CapsPtr caps_of(GstVideoFormat format, const GstVideoInfo& picture) {
+CapsPtr caps_of(const GstVideoInfo& kept) {
   CapsPtr caps(gst_caps_new_simple("video/x-raw", "format", G_TYPE_STRING,
-                                   gst_video_format_to_string(format), nullptr));
-  if (const CharsPtr colours = text_of(picture.colorimetry))
+                                   gst_video_format_to_string(GST_VIDEO_INFO_FORMAT(&kept)),
+                                   nullptr));
+  if (const CharsPtr colours = text_of(kept.colorimetry))
     gst_caps_set_simple(caps.get(), "colorimetry", G_TYPE_STRING, colours.get(), nullptr);
   return caps;
 }
@@ -101,50 +116,34 @@ std::vector<std::string> pictures_of(const fs::path& folder) {
 
 }  // namespace
 
-// What the streaming thread tells of the picture before it is cropped, and the rows that are left.
-struct FrameReader::Crop {
+// What the streaming thread tells of the frames before they are converted.
+struct FrameReader::Kept {
   std::mutex lock;
-  std::function<Rows(const RecordingInfo&)> choose;
-  bool pictures = false;
-  ElementPtr element, between, format;
-  CapsPtr kept;  // once known
-  RecordingInfo first;
-  bool known = false;
-  Rows wanted, left;
+  bool pictures = false, known = false;
+  double rate = 0;
+  GstVideoInfo info = {};  // once known
+  ElementPtr between, format;
   std::string refused;
 
   // With the lock.
-  void set(const GstVideoInfo& seen) {
+  void see(const GstVideoInfo& seen) {
     const int width = GST_VIDEO_INFO_WIDTH(&seen), height = GST_VIDEO_INFO_HEIGHT(&seen);
-    if (known && (width != first.width || height != first.height)) {
+    if (!known) info = kept_info(seen, kept_format(seen, pictures), rate);
+    known = true;
+    if (width != GST_VIDEO_INFO_WIDTH(&info) || height != GST_VIDEO_INFO_HEIGHT(&info)) {
       refused = "frames of " + std::to_string(width) + "x" + std::to_string(height) +
-                " follow frames of " + std::to_string(first.width) + "x" +
-                std::to_string(first.height) + ": a recording has one size";
+                " follow frames of " + std::to_string(GST_VIDEO_INFO_WIDTH(&info)) + "x" +
+                std::to_string(GST_VIDEO_INFO_HEIGHT(&info)) + ": a recording has one size";
       return;
-    }
-    if (!known) {
-      const GstVideoFormat like_this = kept_format(seen, pictures);
-      first = {width, height, 0, picture_info(seen, like_this)};
-      if (GST_VIDEO_INFO_FPS_N(&seen) > 0)
-        first.rate = double(GST_VIDEO_INFO_FPS_N(&seen)) / GST_VIDEO_INFO_FPS_D(&seen);
-      known = true;
-      kept = caps_of(like_this, first.picture);
-      wanted = choose(first);
-      left.first = std::max(0, wanted.first / kAround * kAround - kAround);
-      const int end = (wanted.first + wanted.count + 2 * kAround - 1) / kAround * kAround;
-      left.count = std::min(height, end) - left.first;
     }
     // GStreamer 1.22 takes samples of full range as they are for those of limited range, and the
     // other way round, unless R, G and B are between them.
-    const bool other_range = !GST_VIDEO_INFO_IS_RGB(&seen) &&
-                             !GST_VIDEO_INFO_IS_RGB(&first.picture) &&
-                             seen.colorimetry.range != first.picture.colorimetry.range;
+    const bool other_range = !GST_VIDEO_INFO_IS_RGB(&seen) && !GST_VIDEO_INFO_IS_RGB(&info) &&
+                             seen.colorimetry.range != info.colorimetry.range;
     const CapsPtr way(other_range ? gst_caps_from_string("video/x-raw,format=ARGB64")
                                   : gst_caps_new_any());
     g_object_set(between.get(), "caps", way.get(), nullptr);
-    g_object_set(format.get(), "caps", kept.get(), nullptr);
-    g_object_set(element.get(), "top", left.first, "bottom", height - left.first - left.count,
-                 nullptr);
+    g_object_set(format.get(), "caps", caps_of(info).get(), nullptr);
   }
 
   static GstPadProbeReturn on_event(GstPad*, GstPadProbeInfo* probe, gpointer data) {
@@ -154,13 +153,9 @@ struct FrameReader::Crop {
     gst_event_parse_caps(event, &caps);
     GstVideoInfo info;
     if (!gst_video_info_from_caps(&info, caps)) return GST_PAD_PROBE_OK;
-    auto* const crop = static_cast<Crop*>(data);
-    const std::lock_guard held(crop->lock);
-    try {
-      crop->set(info);
-    } catch (const std::exception& error) {
-      crop->refused = error.what();
-    }
+    auto* const kept = static_cast<Kept*>(data);
+    const std::lock_guard held(kept->lock);
+    kept->see(info);
     // If nothing says what colours are, GStreamer takes it from the height: from that of the
     // picture.
     const CharsPtr colours = text_of(info.colorimetry);
@@ -174,9 +169,8 @@ struct FrameReader::Crop {
   }
 };
 
-FrameReader::FrameReader(std::vector<std::string> paths, double rate,
-                         std::function<Rows(const RecordingInfo&)> choose)
-    : rate_(rate), choose_(std::move(choose)), crop_(std::make_unique<Crop>()) {
+FrameReader::FrameReader(std::vector<std::string> paths, double rate, const GstVideoInfo* like)
+    : rate_(rate), kept_(std::make_unique<Kept>()) {
   if (paths.size() == 1 && fs::is_directory(paths.front())) {
     files_ = pictures_of(paths.front());
     pictures_ = true;
@@ -188,22 +182,31 @@ FrameReader::FrameReader(std::vector<std::string> paths, double rate,
   for (const std::string& file : files_)
     if (!std::ifstream(file))
       throw std::runtime_error(file + " cannot be read: give files, or a folder of pictures");
-  crop_->pictures = pictures_;
-  crop_->choose = [this](const RecordingInfo& info) { return choose_(info); };
+  kept_->pictures = pictures_;
+  kept_->rate = rate;
+  if (!like) return;
+  kept_->info = *like;
+  kept_->known = true;
 }
 
 FrameReader::~FrameReader() {
   frame_.reset();
-  // The pipeline's threads look at the crop.
+  // The pipeline's threads look at what is kept.
   pipeline_.reset();
+}
+
+void FrameReader::begin_at(const Place& place) {
+  next_file_ = place.file;
+  begin_ = end_ = place.begin;
+  seek_ = place.seek;
+  trusts_times_ = place.trusts_times;
 }
 
 // The next file, or all pictures.
 void FrameReader::open() {
   const std::string end =
-      " ! videocrop name=crop ! videoconvert ! capsfilter name=between ! videoconvert ! "
-      "capsfilter name=format ! "
-      "appsink name=sink sync=false max-buffers=2";
+      " ! videoconvert name=first ! capsfilter name=between ! videoconvert ! "
+      "capsfilter name=format ! appsink name=sink sync=false max-buffers=2";
   if (pictures_) {
     const std::string type = media_type_of(files_.front());
     pipeline_ = make_pipeline("appsrc name=source format=time caps=" + type +
@@ -215,19 +218,35 @@ void FrameReader::open() {
   source_ = element_of(pipeline_, "source");
   sink_ = element_of(pipeline_, "sink");
   {
-    const std::lock_guard held(crop_->lock);
-    crop_->element = element_of(pipeline_, "crop");
-    crop_->between = element_of(pipeline_, "between");
-    crop_->format = element_of(pipeline_, "format");
+    const std::lock_guard held(kept_->lock);
+    kept_->between = element_of(pipeline_, "between");
+    kept_->format = element_of(pipeline_, "format");
   }
   if (!pictures_) g_object_set(source_.get(), "location", files_[next_file_++].c_str(), nullptr);
-  GstPad* const pad = gst_element_get_static_pad(crop_->element.get(), "sink");
-  gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, Crop::on_event, crop_.get(), nullptr);
+  GstPad* const pad = gst_element_get_static_pad(element_of(pipeline_, "first").get(), "sink");
+  gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, Kept::on_event, kept_.get(), nullptr);
   gst_object_unref(pad);
   // A decoder may want the next picture before it gives one.
   if (pictures_) feed();
+  const GstClockTime seek = std::exchange(seek_, GST_CLOCK_TIME_NONE);
+  if (GST_CLOCK_TIME_IS_VALID(seek)) {
+    gst_element_set_state(pipeline_.get(), GST_STATE_PAUSED);
+    while (gst_element_get_state(pipeline_.get(), nullptr, nullptr, 100 * GST_MSECOND) ==
+           GST_STATE_CHANGE_ASYNC)
+      has_ended(pipeline_, 0, what_failed());
+    // Where it is refused, frames come from the first one on, with their times.
+    gst_element_seek_simple(
+        pipeline_.get(), GST_FORMAT_TIME,
+        GstSeekFlags(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_KEY_UNIT | GST_SEEK_FLAG_SNAP_BEFORE),
+        static_cast<gint64>(seek));
+  }
   if (gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
-    has_ended(pipeline_, GST_SECOND, "cannot read the recording");
+    has_ended(pipeline_, GST_SECOND, what_failed());
+}
+
+std::string FrameReader::what_failed() const {
+  return next_file_ > 0 ? files_[next_file_ - 1] + " cannot be decoded"
+                        : "cannot read the recording";
 }
 
 // One picture into the pipeline; false where there is none.
@@ -261,7 +280,6 @@ bool FrameReader::next() {
       open();
     }
     if (next_of_file()) return true;
-    note_early_end();
     pipeline_.reset();
     begin_ = end_;
     if (pictures_) return false;
@@ -270,92 +288,56 @@ bool FrameReader::next() {
 
 bool FrameReader::next_of_file() {
   constexpr GstClockTime kPatience = 100 * GST_MSECOND;
-  const std::string what =
-      next_file_ > 0 ? files_[next_file_ - 1] + " cannot be decoded" : "cannot read the recording";
-  if (pictures_) feed();
   for (;;) {
-    SamplePtr sample(gst_app_sink_try_pull_sample(GST_APP_SINK(sink_.get()), kPatience));
-    {
-      const std::lock_guard held(crop_->lock);
-      if (!crop_->refused.empty()) throw std::runtime_error(crop_->refused);
+    if (pictures_) feed();
+    SamplePtr sample;
+    while (!sample) {
+      sample.reset(gst_app_sink_try_pull_sample(GST_APP_SINK(sink_.get()), kPatience));
+      {
+        const std::lock_guard held(kept_->lock);
+        if (!kept_->refused.empty()) throw std::runtime_error(kept_->refused);
+      }
+      if (sample) break;
+      // An error comes before the end that it brings.
+      has_ended(pipeline_, 0, what_failed());
+      if (gst_app_sink_is_eos(GST_APP_SINK(sink_.get()))) return false;
     }
-    if (sample) {
-      take(std::move(sample));
-      return true;
-    }
-    // An error comes before the end that it brings.
-    has_ended(pipeline_, 0, what);
-    if (gst_app_sink_is_eos(GST_APP_SINK(sink_.get()))) return false;
+    if (take(std::move(sample))) return true;
   }
 }
 
-void FrameReader::take(SamplePtr sample) {
+// False: the frame lies before what was looked for.
+bool FrameReader::take(SamplePtr sample) {
   sample_ = std::move(sample);
-  GstBuffer* const buffer = gst_sample_get_buffer(sample_.get());
-  GstVideoInfo info;
-  const bool is_video = gst_video_info_from_caps(&info, gst_sample_get_caps(sample_.get()));
-  if (is_video) frame_.emplace(&info, buffer, GST_MAP_READ);
-  if (!is_video || !*frame_) throw std::runtime_error("a decoded frame cannot be read");
-  if (!known_) {
-    const std::lock_guard held(crop_->lock);
-    info_ = crop_->first;
-    known_ = true;
-  }
-  if (info_.rate <= 0) info_.rate = rate_;
-  const auto length = static_cast<GstClockTime>(std::llround(GST_SECOND / info_.rate));
-  const GstSegment* const segment = gst_sample_get_segment(sample_.get());
+  const GstBuffer* const buffer = gst_sample_get_buffer(sample_.get());
+  const auto length = gst_util_uint64_scale(GST_SECOND, static_cast<guint64>(info().fps_d),
+                                            static_cast<guint64>(info().fps_n));
   const GstClockTime shown =
       GST_BUFFER_PTS_IS_VALID(buffer)
-          ? gst_segment_to_stream_time(segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer))
+          ? gst_segment_to_stream_time(gst_sample_get_segment(sample_.get()), GST_FORMAT_TIME,
+                                       GST_BUFFER_PTS(buffer))
           : GST_CLOCK_TIME_NONE;
+  if (!GST_CLOCK_TIME_IS_VALID(shown) && trusts_times_) return false;
   time_ = GST_CLOCK_TIME_IS_VALID(shown) ? begin_ + shown : end_;
   // Times grow, whatever a file says.
-  if (end_ > 0 && time_ + length / 2 < end_) time_ = end_;
+  if (!trusts_times_ && end_ > 0 && time_ + length / 2 < end_) time_ = end_;
   end_ = time_ + length;
+  return true;
 }
 
-ImageView FrameReader::view() const {
-  ImageView view = frame_->view<const uint8_t>();
-  Rows wanted, left;
-  {
-    const std::lock_guard held(crop_->lock);
-    wanted = crop_->wanted;
-    left = crop_->left;
-  }
-  // Pixels that share a sample are wanted together.
-  const auto down = [&](int c) {
-    const Spacing at = view.spacing(c);
-    return (wanted.first - left.first) / at.rows * at.row_stride;
-  };
-  for (int c = 0; c < 3; ++c) view.channel[c] += down(c);
-  if (view.alpha) view.alpha += down(3);
-  view.height = wanted.count;
-  return view;
+const GstVideoInfo& FrameReader::info() const {
+  const std::lock_guard held(kept_->lock);
+  return kept_->info;
 }
 
-void FrameReader::note_early_end() {
-  // Containers round, and count sound.
-  constexpr GstClockTime kLeast = GST_SECOND;
-  gint64 duration = 0;
-  if (pictures_ || !gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration) ||
-      duration <= 0)
-    return;
-  const auto length = static_cast<GstClockTime>(duration), seen = end_ - begin_;
-  if (seen + std::max(kLeast, length / 50) < length)
-    early_ends_.push_back(files_[next_file_ - 1] + " ends after " +
-                          std::to_string(seen / GST_SECOND) + " s of " +
-                          std::to_string(length / GST_SECOND) + " s: is it cut off?");
-}
+GstBuffer* FrameReader::buffer() const { return gst_sample_get_buffer(sample_.get()); }
 
-double FrameReader::share() const {
-  const auto files = static_cast<double>(files_.size());
-  if (pictures_) return static_cast<double>(next_file_) / files;
-  double of_file = 1;
-  gint64 duration = 0;
-  if (pipeline_ && gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration) &&
-      duration > 0)
-    of_file = std::min(1.0, static_cast<double>(end_ - begin_) / static_cast<double>(duration));
-  return std::max(0.0, static_cast<double>(next_file_) - 1 + of_file) / files;
+ImageView FrameReader::view() {
+  GstVideoInfo info;
+  if (gst_video_info_from_caps(&info, gst_sample_get_caps(sample_.get())))
+    frame_.emplace(&info, buffer(), GST_MAP_READ);
+  if (!frame_ || !*frame_) throw std::runtime_error("a decoded frame cannot be read");
+  return frame_->view<const uint8_t>();
 }
 
 }  // namespace qdmd::archive

@@ -1,10 +1,9 @@
-// Frames of recordings, of which a process keeps some rows only.
+// Frames of recordings, from any place on.
 #pragma once
 
 #include <gst/video/video.h>
 
-#include <filesystem>
-#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,61 +14,60 @@
 
 namespace qdmd::archive {
 
-struct RecordingInfo {
-  int width = 0, height = 0;  // pixels
-  double rate = 0;            // frames a second
-  // The format of pictures that are made of its frames: I420, Y42B, Y444, GRAY8 or RGB.
-  GstVideoInfo picture = {};
-};
-
-// Rows of a picture.
-struct Rows {
-  int first = 0, count = 0;
+// Where reading begins.
+struct Place {
+  size_t file = 0;         // of the files, or of the folder's pictures
+  GstClockTime begin = 0;  // when that file begins, in the recording
+  // A time of that file: decoding begins with a key frame before it; none: with the file.
+  GstClockTime seek = GST_CLOCK_TIME_NONE;
+  // Times of frames are taken as the files have them, and frames without one are left out.
+  bool trusts_times = false;
 };
 
 // Reads files one after another as one recording, or a folder's pictures (PNG or JPEG) in the order
-// of their names. Whatever can be decoded is; other rows than those that are wanted are cropped
-// before anything is converted. Frames keep their colours and how many pixels share a sample of
-// them, but have 8 bits and no alpha; if they differ in that, all become like the first. Grey
+// of their names. Whatever can be decoded is. Frames keep their format where the element takes it,
+// else the nearest that loses nothing; if later ones differ, they become like the first. Grey
 // pictures become coloured, because others may follow. Throws std::runtime_error with a sentence
 // for the user.
 class FrameReader {
  public:
-  // choose: which rows are wanted, once the size is known. rate: of pictures.
-  FrameReader(std::vector<std::string> paths, double rate,
-              std::function<Rows(const RecordingInfo&)> choose);
+  // rate: of pictures, and of files that do not say theirs, frames a second. like: what frames are
+  // to be; null: like the first.
+  FrameReader(std::vector<std::string> paths, double rate, const GstVideoInfo* like = nullptr);
   ~FrameReader();
 
-  // The next frame; false at the end.
+  // Before the first next().
+  void begin_at(const Place& place);
+  // The next frame, from the beginning or from the place that was given: from a key frame before a
+  // time, there may be earlier ones. False at the end.
   bool next();
-  // The rows of it that are wanted, good until the next call; and when it is shown, in nanoseconds
-  // from the first one.
-  ImageView view() const;
+  // It, good until the next call.
+  GstBuffer* buffer() const;
+  ImageView view();
+  // When it is shown, in nanoseconds from the recording's first frame.
   GstClockTime time() const { return time_; }
-  // The share of the recording that was read, 0 .. 1, about.
-  double share() const;
-  const RecordingInfo& info() const { return info_; }
-  // A sentence for each file that was read to an end long before the one that it names.
-  const std::vector<std::string>& early_ends() const { return early_ends_; }
+  // Once there is a frame: of all frames, with their rate.
+  const GstVideoInfo& info() const;
+  // Files, or pictures.
+  const std::vector<std::string>& files() const { return files_; }
+  bool pictures() const { return pictures_; }
 
  private:
-  struct Crop;
+  struct Kept;
   void open();
   bool feed();
   bool next_of_file();
-  void note_early_end();
-  void take(SamplePtr sample);
+  bool take(SamplePtr sample);
+  std::string what_failed() const;
 
-  std::vector<std::string> files_, early_ends_;
-  bool pictures_ = false;
+  std::vector<std::string> files_;
+  bool pictures_ = false, trusts_times_ = false;
   double rate_;
-  std::function<Rows(const RecordingInfo&)> choose_;
   size_t next_file_ = 0;
-  std::unique_ptr<Crop> crop_;
+  GstClockTime seek_ = GST_CLOCK_TIME_NONE;
+  std::unique_ptr<Kept> kept_;
   PipelinePtr pipeline_;
   ElementPtr source_, sink_;
-  RecordingInfo info_;
-  bool known_ = false;
   SamplePtr sample_;
   std::optional<MappedVideoFrame> frame_;
   // Where the file begins, and where its newest frame ends, in time.

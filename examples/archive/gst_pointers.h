@@ -11,6 +11,7 @@ namespace qdmd::archive {
 
 // Functions of GStreamer's headers belong to each file that includes them: types do not name them.
 struct Free {
+  void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
   void operator()(GstSample* sample) const { gst_sample_unref(sample); }
   void operator()(GstMessage* message) const { gst_message_unref(message); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
@@ -27,6 +28,8 @@ struct StopPipeline {
 };
 using PipelinePtr = std::unique_ptr<GstElement, StopPipeline>;
 using ElementPtr = std::unique_ptr<GstElement, Free>;
+using PadPtr = std::unique_ptr<GstPad, Free>;
+using BufferPtr = std::unique_ptr<GstBuffer, Free>;
 using SamplePtr = std::unique_ptr<GstSample, Free>;
 using MessagePtr = std::unique_ptr<GstMessage, Free>;
 using CharsPtr = std::unique_ptr<gchar, Free>;

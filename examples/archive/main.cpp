@@ -1,149 +1,105 @@
-// qdmd-archive: backgrounds, masks and foregrounds of recordings whose window no machine holds.
+// qdmd-archive: backgrounds, masks and foregrounds of recordings, by as many processes as there
+// are.
 #include <gst/gst.h>
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <new>
 
+#include "examples/archive/element_options.h"
 #include "examples/archive/job.h"
+#include "examples/archive/launch.h"
+#include "examples/archive/rows.h"
+#include "examples/archive/video_writer.h"
 
 namespace {
 
 using namespace qdmd;
 using namespace qdmd::archive;
 
-template <typename T>
-using Names = std::map<std::string, T>;
-
-// The element's names.
-const Names<Method> kMethods{
-    {"qdmd", Method::qdmd}, {"dmd", Method::dmd}, {"robust", Method::robust}};
-const Names<Amplitude> kAmplitudes{{"window", Amplitude::window},
-                                   {"first-frame", Amplitude::first_frame}};
-const Names<Solver> kSolvers{
-    {"auto", Solver::automatic}, {"gram", Solver::gram}, {"gram-extended", Solver::gram_extended}};
-const Names<Estimator> kEstimators{{"exact", Estimator::exact},
-                                   {"forward-backward", Estimator::forward_backward},
-                                   {"total", Estimator::total},
-                                   {"optimized", Estimator::optimized}};
-const Names<Shadows> kShadows{{"background", Shadows::background},
-                              {"foreground", Shadows::foreground},
-                              {"marked", Shadows::marked}};
-
-struct Paths {
-  std::string background, mask, foreground, cutout;
+struct Words {
+  std::string background, mask, foreground, cutout, part, by = "time";
 };
 
-template <typename T>
-CLI::Option* add_choice(CLI::App& app, const char* name, T* value, const Names<T>& names,
-                        const char* help) {
-  std::string now;
-  for (const auto& [text, of_name] : names)
-    if (of_name == *value) now = text;
-  return app
-      .add_option_function<std::string>(
-          name, [value, &names](const std::string& text) { *value = names.at(text); }, help)
-      ->check(CLI::IsMember(&names))
-      ->default_str(now);
-}
-
-void declare(CLI::App& app, JobOptions& options, Paths& paths) {
-  EngineOptions& engine = options.engine;
+void declare(CLI::App& app, JobOptions& options, Words& words) {
   app.add_option("recording", options.recordings,
                  "Files that are one recording, in this order; or a folder of pictures (PNG or "
                  "JPEG), in the order of their names")
       ->required()
       ->check(CLI::ExistingPath);
-  app.add_option("--background", paths.background,
+  app.add_option("--background", words.background,
                  "Backgrounds: .png, a picture of each window (-2, -3 .. after the first's name), "
                  "or .mkv, a video of each frame's");
-  app.add_option("--mask", paths.mask, "Video of the masks, .mkv");
-  app.add_option("--foreground", paths.foreground, "Video of the foreground, .mkv");
-  app.add_option("--cutout", paths.cutout, "Video of the frames where the mask is set, .mkv");
-  app.add_option("--window,--window-size", engine.window_size,
-                 "Frames that are decomposed together")
-      ->check(CLI::Range(EngineOptions::kMinWindow, EngineOptions::kMaxWindow))
+  app.add_option("--mask", words.mask, "Video of the masks, .mkv");
+  app.add_option("--foreground", words.foreground, "Video of the foreground, .mkv");
+  app.add_option("--cutout", words.cutout, "Video of the frames where the mask is set, .mkv");
+  app.add_option("--jobs", options.jobs, "Processes that share the recording on this machine")
+      ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  add_choice(app, "--method", &engine.method, kMethods, "How a window is decomposed");
-  app.add_option("--rank", engine.dmd.rank,
-                 "Singular values that are kept (0: all for qdmd and dmd, 1 for robust)")
-      ->check(CLI::Range(0, EngineOptions::kMaxWindow))
+  app.add_option("--part", words.part,
+                 "K/N: this process does the K-th of N shares, and others, started in the same "
+                 "way, the rest; the last one that ends joins them");
+  app.add_flag("--join", options.join, "Do nothing but join what all parts have done");
+  app.add_option("--stretch", options.stretch,
+                 "Frames that a process takes at a time (0: the recording's share, at most 25 "
+                 "times --warm-up)")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
-  app.add_option("--omega-threshold", engine.dmd.omega_threshold,
-                 "Modes at most so far from the origin, in rad/frame, are background (0: the "
-                 "nearest)")
-      ->check(CLI::NonNegativeNumber)
+  app.add_option("--warm-up", options.warm_up,
+                 "Frames before a stretch that the process looks at first (-1: three windows)")
+      ->check(CLI::Range(int64_t{-1}, int64_t{1} << 40))
       ->capture_default_str();
-  add_choice(app, "--amplitude", &engine.dmd.amplitude, kAmplitudes,
-             "Which frames decide how strong the background mode is");
-  add_choice(app, "--solver", &engine.dmd.solver, kSolvers,
-             "How the decomposition is computed; those that read pixels need one machine");
-  add_choice(app, "--estimator", &engine.dmd.estimator, kEstimators,
-             "How eigenvalues are estimated from frames with noise");
-  app.add_option("--sample-step", engine.sample_step,
-                 "The decomposition sees every k-th pixel in x and y (0: chosen)")
-      ->check(CLI::Range(0, EngineOptions::kMaxSampleStep))
+  app.add_option("--by", words.by,
+                 "What processes share out: time, or the rows of each window, for --background "
+                 "x.png with --method qdmd or dmd: a window may then be larger than a machine")
+      ->check(CLI::IsMember({"time", "rows"}))
       ->capture_default_str();
-  app.add_option("--iterations", engine.iterations, "Of robust")
-      ->check(CLI::Range(1, EngineOptions::kMaxIterations))
-      ->capture_default_str();
-  app.add_option("--foreground-threshold", engine.foreground_threshold,
-                 "Levels from the background above which a pixel is foreground (0: from the noise)")
-      ->check(CLI::Range(0.0, 442.0))
-      ->capture_default_str();
-  app.add_option("--absorb-time", options.absorb_time,
-                 "Seconds that something which came and stands still is foreground (0: for ever)")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
-  add_choice(app, "--shadows", &options.shadows, kShadows,
-             "What masks make of the background in another light");
-  app.add_option("--n-threads", engine.threads,
-                 "Threads of each process (0: one for each core); start a process a core instead, "
-                 "or one a machine with all its cores where memory is short")
-      ->check(CLI::Range(0, EngineOptions::kMaxThreads))
-      ->capture_default_str();
-  app.add_option("--max-memory", engine.max_memory, "Bytes that each process may take")
-      ->transform(CLI::AsSizeValue(false));
   app.add_option("--framerate", options.rate, "Of pictures, frames a second")
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
   app.add_option("--encoder", options.encoder,
                  "Elements of GStreamer that make a file of raw video; the default loses nothing")
       ->capture_default_str();
-  app.add_flag("--resume", options.resume, "Go on after the last window that was written");
+  app.add_flag("--resume", options.resume, "Go on with what an earlier job has not done");
   app.add_option("--report", options.report,
-                 "Write what each process took in memory, time and bytes a frame, as JSON, to this "
-                 "file (-: to standard output)");
+                 "Write what each stretch took in memory and time, as JSON, to this file (-: to "
+                 "standard output)");
   app.add_flag("--quiet", options.quiet, "Say nothing but errors");
+  for (const ElementOption& option : element_options())
+    app.add_option_function<std::string>(
+           "--" + option.name + (option.name == "window-size" ? ",--window" : ""),
+           [&options, name = option.name](const std::string& value) {
+             options.properties[name] = value;
+           },
+           option.help)
+        ->group("As the element's property")
+        ->default_str(option.preset);
 }
 
-std::vector<Wanted> wanted_of(const Paths& paths) {
-  std::vector<Wanted> wanted;
+void understand(const Words& words, JobOptions* options) {
   const auto add = [&](Output output, const std::string& path) {
-    if (!path.empty()) wanted.push_back({output, path});
+    if (!path.empty()) options->wanted.push_back({output, path});
   };
-  add(Output::background, paths.background);
-  add(Output::mask, paths.mask);
-  add(Output::foreground, paths.foreground);
-  add(Output::cutout, paths.cutout);
-  return wanted;
-}
-
-// What all processes find alike is said once.
-int fail(const MpiTeam* team, const char* what, bool alike) {
-  if (!team || !alike) {
-    std::fprintf(stderr, "qdmd-archive%s: %s\n",
-                 team ? (" (process " + std::to_string(team->rank()) + ")").c_str() : "", what);
-  } else if (team->rank() == 0) {
-    std::fprintf(stderr, "qdmd-archive: %s\n", what);
-  }
-  std::fflush(stderr);
-  // The others wait for this one.
-  if (team && !alike) MpiTeam::abort();
-  return alike ? 2 : 1;
+  add(Output::background, words.background);
+  add(Output::mask, words.mask);
+  add(Output::foreground, words.foreground);
+  add(Output::cutout, words.cutout);
+  char rest = 0;
+  if (!words.part.empty() &&
+      (std::sscanf(words.part.c_str(), "%d/%d%c", &options->part, &options->parts, &rest) != 2 ||
+       options->part < 1 || options->part > options->parts))
+    throw std::invalid_argument("--part is K/N with 1 <= K <= N, as 3/16");
+  // What is as large as the recording needs is not asked for by mistake.
+  options->properties.try_emplace("max-memory", std::to_string(UINT64_MAX));
+  const bool alone = options->jobs == 1 && ranks_of_environment().size == 1;
+  if (!alone) options->properties.try_emplace("n-threads", "1");
+  GstElement* const element = make_element(options->properties);
+  guint window = 0;
+  g_object_get(element, "window-size", &window, nullptr);
+  gst_object_unref(element);
+  options->window = static_cast<int>(window);
 }
 
 // The C library gives the memory of frames back to the system when they are freed, as blocks or
@@ -164,41 +120,33 @@ void keep_memory_of_frames() {
 // Ends with 0; 1 where something failed; 2 where options are wrong.
 int main(int argc, char** argv) {
   keep_memory_of_frames();
-  std::unique_ptr<MpiTeam> team;
   try {
-    if (MpiTeam::is_job()) team = std::make_unique<MpiTeam>(&argc, &argv);
     gst_init(nullptr, nullptr);
     JobOptions options;
-    options.engine.threads = 1;
-    options.engine.max_memory = UINT64_MAX;
-    Paths paths;
+    options.encoder = kLossless;
+    Words words;
     CLI::App app(
-        "Separates background and foreground of recordings, window by window. The processes of an "
-        "MPI job share each window: mpirun -n 8 qdmd-archive ...");
-    declare(app, options, paths);
+        "Separates background and foreground of recordings, stretch after stretch, by as many "
+        "processes as --jobs, --part or mpirun start.");
+    declare(app, options, words);
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-      // What only some find is no matter of options.
-      const bool alike = !team || team->agree(true) == 2;
-      if (alike && team && team->rank() > 0) return error.get_exit_code() == 0 ? 0 : 2;
-      const int status = app.exit(error) == 0 ? 0 : 2;
-      if (!alike) MpiTeam::abort();
-      return status;
+      return app.exit(error) == 0 ? 0 : 2;
     }
-    // Somebody is about to end the job.
-    if (team && team->agree(false) != 0) team->wait_for_all();
-    options.wanted = wanted_of(paths);
-    run_job(options, team.get());
-    return 0;
+    understand(words, &options);
+    if (words.by == "rows") return run_rows(options, &argc, &argv);
+    return run_job(options, argv);
   } catch (const std::invalid_argument& error) {
-    return fail(team.get(), error.what(), true);
+    std::fprintf(stderr, "qdmd-archive: %s\n", error.what());
+    return 2;
   } catch (const std::bad_alloc&) {
-    return fail(team.get(),
-                "not enough memory for the window: start more processes, lower --window, or scale "
-                "the video down",
-                false);
+    std::fprintf(stderr,
+                 "qdmd-archive: not enough memory for the window: lower --window-size, or scale "
+                 "the video down\n");
+    return 1;
   } catch (const std::exception& error) {
-    return fail(team.get(), error.what(), false);
+    std::fprintf(stderr, "qdmd-archive: %s\n", error.what());
+    return 1;
   }
 }

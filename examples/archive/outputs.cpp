@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "examples/archive/files.h"
-#include "examples/archive/picture.h"
+#include "examples/archive/job_folder.h"
+#include "examples/archive/video_writer.h"
 
 namespace qdmd::archive {
 namespace {
@@ -15,14 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string folder_of(const std::string& path) { return path + ".parts"; }
-
-std::string picture_of(const std::string& path, int64_t window) {
-  if (window == 0) return path;
-  const fs::path whole(path);
-  return (whole.parent_path() /
-          (whole.stem().string() + "-" + std::to_string(window + 1) + whole.extension().string()))
-      .string();
-}
 
 const char* option_of(Output output) {
   switch (output) {
@@ -65,10 +58,8 @@ std::vector<fs::path> files_of_job(const std::vector<Wanted>& wanted, const std:
   std::vector<fs::path> all;
   if (!report.empty() && report != "-") all.emplace_back(report);
   for (const Wanted& one : wanted) {
-    for (const std::string& path : {one.path, progress_of(one.path)}) {
-      all.emplace_back(path);
-      all.emplace_back(temporary_of(path));
-    }
+    all.emplace_back(one.path);
+    all.emplace_back(temporary_of(one.path));
     std::error_code error;
     for (fs::directory_iterator entry(beside(one.path), error), end;
          one.is_picture() && !error && entry != end; entry.increment(error))
@@ -93,9 +84,10 @@ void check_not_read(const std::vector<Wanted>& wanted, const std::string& report
     }
   for (const Wanted& one : wanted)
     for (const fs::path recording : recordings)
-      if (is_same(folder_of(one.path), beside(recording)))
-        throw std::runtime_error(recording.string() + " is in the folder of " + one.path +
-                                 "'s parts, which are removed: move it first");
+      for (const std::string& folder : {folder_of(one.path), JobFolder(one.path).path()})
+        if (is_same(folder, beside(recording)))
+          throw std::runtime_error(recording.string() + " is in " + folder +
+                                   ", which is removed: move it first");
 }
 
 }  // namespace
@@ -124,94 +116,51 @@ void check_wanted(const std::vector<Wanted>& wanted, const std::vector<std::stri
   check_not_read(wanted, report, recordings);
 }
 
-Outputs::Outputs(std::vector<Wanted> wanted, const GstVideoInfo& picture, double rate,
-                 std::string encoder)
-    : wanted_(std::move(wanted)),
-      picture_(picture),
-      mask_(mask_info(picture)),
-      rate_(rate),
-      encoder_(std::move(encoder)) {}
-
-std::string Outputs::part_of(size_t which, int64_t window) const {
+std::string part_of(const std::string& path, size_t stretch) {
   char name[32];
-  std::snprintf(name, sizeof name, "%08lld.mkv", static_cast<long long>(window + 1));
-  return (fs::path(folder_of(wanted_[which].path)) / name).string();
+  std::snprintf(name, sizeof name, "%08zu.mkv", stretch + 1);
+  return (fs::path(folder_of(path)) / name).string();
 }
 
-Outputs::Open Outputs::open(size_t which, const std::string& path,
-                            const std::string& encoder) const {
-  const GstVideoInfo& info = wanted_[which].output == Output::mask ? mask_ : picture_;
-  return {path, std::make_unique<VideoWriter>(temporary_of(path), info, rate_, encoder)};
+std::string picture_of(const std::string& path, int64_t window) {
+  if (window == 0) return path;
+  const fs::path whole(path);
+  return (whole.parent_path() /
+          (whole.stem().string() + "-" + std::to_string(window + 1) + whole.extension().string()))
+      .string();
 }
 
-void Outputs::begin_after(int64_t windows) {
-  for (size_t which = 0; which < wanted_.size(); ++which) {
-    const fs::path beside = fs::absolute(wanted_[which].path).parent_path();
+void begin_parts(const std::vector<Wanted>& wanted) {
+  for (const Wanted& one : wanted) {
+    const fs::path beside = fs::absolute(one.path).parent_path();
     if (!fs::is_directory(beside))
       throw std::runtime_error(beside.string() + " is no folder: make it first");
-    if (wanted_[which].is_picture()) {
-      fs::remove(temporary_of(picture_of(wanted_[which].path, windows)));
-      continue;
-    }
-    const fs::path folder = folder_of(wanted_[which].path);
-    fs::create_directories(folder);
-    std::vector<fs::path> known;
-    for (int64_t window = 0; window < windows; ++window) known.push_back(part_of(which, window));
-    std::vector<fs::path> unknown;
-    for (const auto& entry : fs::directory_iterator(folder))
-      if (std::find(known.begin(), known.end(), entry.path()) == known.end())
-        unknown.push_back(entry.path());
-    for (const fs::path& path : unknown) fs::remove(path);
-    for (const fs::path& path : known)
-      if (!fs::exists(path))
-        throw std::runtime_error(path.string() + " is gone: begin anew, without --resume");
+    if (one.is_picture()) continue;
+    fs::remove_all(folder_of(one.path));
+    fs::create_directory(folder_of(one.path));
   }
 }
 
-void Outputs::write(size_t which, int64_t window, std::span<const uint8_t> frame,
-                    GstClockTime time) {
-  auto file = files_.find(which);
-  if (file == files_.end())
-    file = files_.emplace(which, open(which, part_of(which, window), encoder_)).first;
-  file->second.writer->write(frame, time);
+void check_parts(const std::vector<Wanted>& wanted, const std::vector<size_t>& stretches) {
+  for (const Wanted& one : wanted)
+    for (size_t stretch : stretches)
+      if (!one.is_picture() && !fs::exists(part_of(one.path, stretch)))
+        throw std::runtime_error(part_of(one.path, stretch) +
+                                 " is gone: begin anew, without --resume");
 }
 
-void Outputs::write_picture(size_t which, int64_t window, std::span<const uint8_t> frame) {
-  wait();
-  Open file = open(which, picture_of(wanted_[which].path, window), kPicture);
-  file.writer->write(frame, 0);
-  files_.emplace(which, std::move(file));
-}
-
-void Outputs::end_window(std::function<void()> after) {
-  wait();
-  ending_ = std::async(std::launch::async,
-                       [files = std::exchange(files_, {}), after = std::move(after)]() mutable {
-                         for (auto& [which, file] : files) {
-                           file.writer->end();
-                           file.writer.reset();
-                           give_name(file.path);
-                         }
-                         after();
-                       });
-}
-
-void Outputs::wait() {
-  if (ending_.valid()) ending_.get();
-}
-
-void Outputs::join(int64_t windows) {
-  for (size_t which = 0; which < wanted_.size(); ++which) {
-    if (wanted_[which].is_picture()) continue;
+void join_parts(const std::vector<Wanted>& wanted, const std::vector<size_t>& stretches) {
+  for (const Wanted& one : wanted) {
+    if (one.is_picture()) continue;
     std::vector<std::string> parts;
-    for (int64_t window = 0; window < windows; ++window) parts.push_back(part_of(which, window));
-    join_videos(parts, temporary_of(wanted_[which].path));
-    give_name(wanted_[which].path);
+    for (size_t stretch : stretches) parts.push_back(part_of(one.path, stretch));
+    join_videos(parts, temporary_of(one.path));
+    give_name(one.path);
   }
 }
 
-void Outputs::remove_parts() {
-  for (const Wanted& one : wanted_)
+void remove_parts(const std::vector<Wanted>& wanted) {
+  for (const Wanted& one : wanted)
     if (!one.is_picture()) fs::remove_all(folder_of(one.path));
 }
 

@@ -30,16 +30,23 @@ void ProgressLine::begin(double share) {
   begin_ = Clock::now();
 }
 
-void ProgressLine::show(double share, int64_t frames, int64_t window) {
-  const Clock::time_point now = Clock::now();
-  if (quiet_ || now - said_ < std::chrono::seconds(terminal_ ? 1 : 5)) return;
-  said_ = now;
-  const double seconds = std::chrono::duration<double>(now - begin_).count();
-  const double done = std::max(share - begun_at_, 1e-6), left = std::max(1 - share, 0.0);
-  std::fprintf(stderr, "%s%lld frames, window %lld, %.1f %%, about %s left%s",
-               terminal_ ? "\r\033[K" : "", static_cast<long long>(frames),
-               static_cast<long long>(window), 100 * share,
-               duration_text(seconds * left / done).c_str(), terminal_ ? "" : "\n");
+bool ProgressLine::is_time() const {
+  return !quiet_ && Clock::now() - said_ >= std::chrono::seconds(terminal_ ? 1 : 5);
+}
+
+void ProgressLine::show(double share, int64_t frames, int64_t all) {
+  said_ = Clock::now();
+  const double seconds = std::chrono::duration<double>(said_ - begin_).count();
+  const double done = share - begun_at_;
+  std::string text = std::to_string(frames) + " frames";
+  if (all > 0) {
+    char part[64];
+    std::snprintf(part, sizeof part, " of %lld, %.1f %%", static_cast<long long>(all), 100 * share);
+    text += part;
+    // The first frames come after the first window.
+    if (done > 0) text += ", about " + duration_text(seconds * (1 - share) / done) + " left";
+  }
+  std::fprintf(stderr, "%s%s%s", terminal_ ? "\r\033[K" : "", text.c_str(), terminal_ ? "" : "\n");
   std::fflush(stderr);
   open_ = terminal_;
 }

@@ -13,7 +13,10 @@ class ProgressLine {
 
   // Work begins where that share of the recording was read, 0 .. 1.
   void begin(double share);
-  void show(double share, int64_t frames, int64_t window);
+  // True when something is to be shown again.
+  bool is_time() const;
+  // Of so many frames in all; 0: nobody knows.
+  void show(double share, int64_t frames, int64_t all);
   void say(const char* what);
   void end();
 

@@ -1,8 +1,8 @@
-"""Runs qdmd-archive with mpirun: whatever the number of processes, and however often it is killed,
-what it writes is what one process writes, and what the element gives of the same window.
+"""Runs qdmd-archive with --jobs, --part and mpirun: whatever the number of processes, and however
+often they are killed, what they write is the same, and what the element gives.
 
 Usage: archive_test.py ARCHIVE MPIRUN [WORD...]     WORD: only cases with one of them in the name
-       QDMD_ARCHIVE_LONG=1: more kills and numbers of processes
+       QDMD_ARCHIVE_LONG=1: more kills
 """
 import json
 import os
@@ -33,27 +33,21 @@ LONG = bool(os.environ.get('QDMD_ARCHIVE_LONG'))
 JOB = ['--oversubscribe', '--allow-run-as-root', '--bind-to', 'none', '--mca', 'plm', 'isolated',
        '--mca', 'btl', 'self,vader', '--mca', 'oob_tcp_if_include', 'lo', '--mca',
        'btl_vader_single_copy_mechanism', 'none', '--mca', 'mpi_yield_when_idle', '1']
-WIDTH, HEIGHT, FRAMES, WINDOW = 161, 123, 50, 20
-LONG_FRAMES = 97
+WIDTH, HEIGHT, FRAMES, WINDOW = 162, 122, 90, 10
 
 
-def command(processes, *words):
-    words = [str(word) for word in words]
-    if processes == 0:  # by itself, without mpirun
-        return [archive, *words]
-    return [mpirun, '-q', '-n', str(processes), *JOB, archive, *words]
+def command(*words, ranks=0):
+    words = [archive, *map(str, words)]
+    return [mpirun, '-q', '-n', str(ranks), *JOB, *words] if ranks else words
 
 
-def run(folder, processes, *words, expect=0, env=None):
-    done = subprocess.run(command(processes, *words), cwd=folder, capture_output=True, text=True,
+def run(folder, *words, expect=0, ranks=0, env=None):
+    done = subprocess.run(command(*words, ranks=ranks), cwd=folder, capture_output=True, text=True,
                           timeout=240, env=env)
     text = done.stdout + done.stderr
-    if expect == 0:
-        assert done.returncode == 0, f'exit status {done.returncode}\n{text}'
-    elif processes == 0:
-        assert done.returncode == expect, f'exit status {done.returncode}\n{text}'
-    else:
-        assert done.returncode != 0, f'it ended well\n{text}'
+    # mpirun has a status of its own.
+    status = bool(done.returncode) if ranks else done.returncode
+    assert status == (bool(expect) if ranks else expect), f'{words}: exit status {status}\n{text}'
     return text
 
 
@@ -95,62 +89,6 @@ def video(path, pixel_format=None):
     return frames_of(f'filesrc location="{path}" ! decodebin', pixel_format)
 
 
-def make_clip(path, frames=FRAMES, width=WIDTH, height=HEIGHT, pixels='I420', seed=3,
-              encoder='avenc_ffv1'):
-    common.play(f'qdmdscenesrc scene=basic,noise=2,trees seed={seed} num-buffers={frames} ! '
-                f'video/x-raw,width={width},height={height},framerate=25/1 ! videoconvert ! '
-                f'video/x-raw,format={pixels} ! {encoder} ! matroskamux ! '
-                f'filesink location="{path}"').set_state(Gst.State.NULL)
-
-
-def outputs(folder, name):
-    return ['--background', folder / f'{name}.png', '--mask', folder / f'{name}-mask.mkv',
-            '--foreground', folder / f'{name}-foreground.mkv']
-
-
-def results(folder, name):
-    """All that a job has written."""
-    pictures = {path.name[len(name):]: video(path)[0][1]
-                for path in sorted(folder.glob(f'{name}*.png'))}
-    return (pictures, video(folder / f'{name}-mask.mkv', 'GRAY8'),
-            video(folder / f'{name}-foreground.mkv'))
-
-
-def leftovers(folder, name):
-    return [path.name for path in folder.glob(f'{name}*')
-            if path.suffix in ('.parts', '.tmp', '.progress')]
-
-
-def compare(one, other, what):
-    assert one[0].keys() == other[0].keys(), f'{what}: {one[0].keys()} and {other[0].keys()}'
-    for number in one[0]:
-        assert one[0][number] == other[0][number], f'{what}: another background {number}'
-    for kind, mine, theirs in (('mask', one[1], other[1]), ('foreground', one[2], other[2])):
-        assert [time for time, _ in mine] == [time for time, _ in theirs], f'{what}: {kind} times'
-        differ = [t for t, (a, b) in enumerate(zip(mine, theirs)) if a[1] != b[1]]
-        assert not differ, f'{what}: {kind} of frames {differ}'
-
-
-def any_number_of_processes(folder, method):
-    clip = folder / 'clip.mkv'
-    run(folder, 0, clip, *outputs(folder, f'{method}0'), '--window', WINDOW, '--method', method,
-        '--report', f'{method}0.json', '--quiet')
-    alone = results(folder, f'{method}0')
-    solves = json.loads((folder / f'{method}0.json').read_text())['solves']
-    assert len(solves) == 3 and len(alone[0]) == 3 and len(alone[1]) == FRAMES, solves
-    assert 0 < sum(mask.count(255) for _, mask in alone[1]), 'empty masks compare nothing'
-    for processes in (1, 2, 3, 4):
-        name = f'{method}{processes}'
-        run(folder, processes, clip, *outputs(folder, name), '--window', WINDOW, '--method',
-            method, '--report', f'{name}.json', '--quiet')
-        compare(alone, results(folder, name), name)
-        found = json.loads((folder / f'{name}.json').read_text())
-        assert found['solves'] == solves, f'{name}: {found["solves"]}, alone {solves}'
-        assert found['processes'] == processes and sum(found['of-process']['rows']) == HEIGHT
-        assert not leftovers(folder, name), leftovers(folder, name)
-    return alone, solves
-
-
 def decoded(clip):
     """Its frames as they are decoded, and their caps."""
     pipeline = Gst.parse_launch(f'filesrc location="{clip}" ! decodebin ! appsink name=end sync=false')
@@ -162,120 +100,213 @@ def decoded(clip):
     return buffers, caps
 
 
-def element_of_window(clip, first, count, method, output, into=''):
-    """What the element sends of frames first .. first + count - 1, and its message."""
-    buffers, caps = decoded(clip)
-    pipeline = Gst.parse_launch(
-        f'appsrc name=source format=time ! qdmdbackground window-size={WINDOW} method={method} '
-        f'output={output} stabilize=off post-messages=true {into} ! appsink name=end sync=false')
-    source, end = pipeline.get_by_name('source'), pipeline.get_by_name('end')
+def make_clip(path, frames=FRAMES, width=WIDTH, height=HEIGHT, pixels='I420', seed=3,
+              encoder='avenc_ffv1'):
+    common.play(f'qdmdscenesrc scene=basic,noise=2,trees seed={seed} num-buffers={frames} ! '
+                f'video/x-raw,width={width},height={height},framerate=25/1 ! videoconvert ! '
+                f'video/x-raw,format={pixels} ! {encoder} ! matroskamux ! '
+                f'filesink location="{path}"').set_state(Gst.State.NULL)
+
+
+def leftovers(folder, name):
+    return [path.name for path in folder.glob(f'{name}*')
+            if path.suffix in ('.parts', '.tmp', '.progress')]
+
+
+OUTPUTS = {'background': '.png', 'mask': '-mask.mkv', 'foreground': '-foreground.mkv'}
+
+
+def outputs(name):
+    return [word for kind, end in OUTPUTS.items() for word in (f'--{kind}', f'{name}{end}')]
+
+
+def results(folder, name):
+    """All that a job has written: the background of each window, and the frames of each video."""
+    found = {path.name[len(name):]: video(path) for path in sorted(folder.glob(f'{name}*.png'))}
+    for kind, end in list(OUTPUTS.items())[1:]:
+        found[kind] = video(folder / f'{name}{end}')
+    return found
+
+
+def compare(one, other, what):
+    assert one.keys() == other.keys(), f'{what}: {one.keys()} and {other.keys()}'
+    for kind in one:
+        assert [time for time, _ in one[kind]] == [time for time, _ in other[kind]], \
+            f'{what}: times of {kind}'
+        differ = [t for t, (a, b) in enumerate(zip(one[kind], other[kind])) if a != b]
+        assert not differ, f'{what}: {kind} of frames {differ}'
+
+
+def of_the_element(clip, kind, *settings):
+    """What the element sends, as the archive keeps it."""
+    form = {'mask': 'video/x-raw,format=GRAY8 ! '}.get(kind, '')
+    return frames_of(f'filesrc location="{clip}" ! decodebin ! qdmdseparate name=s '
+                     f'{" ".join(settings)} s.{kind} ! {form}queue')
+
+
+def one_stretch_is_the_element(folder):
+    """Whatever the element can: one product."""
+    for settings in ([], ['stabilize=translation', 'mask-softness=2', 'shadows=marked'],
+                     ['method=dmd', 'sample-step=2'], ['mode=live', 'hop-size=4'],
+                     ['ignore=<<0,0,40,60>>']):
+        words = [word for one in settings for word in ('--' + one.partition('=')[0],
+                                                       one.partition('=')[2])]
+        run(folder, 'clip.mkv', *outputs('one'), '--cutout', 'one-cutout.mkv', '--window', WINDOW,
+            '--quiet', *words)
+        for kind in ('mask', 'foreground', 'cutout'):
+            expected = of_the_element(folder / 'clip.mkv', kind, f'window-size={WINDOW}', *settings)
+            assert video(folder / f'one-{kind}.mkv') == expected, f'{kind}, {settings}'
+        assert any(mask.count(255) for _, mask in video(folder / 'one-mask.mkv'))
+    backgrounds = frames_of(f'filesrc location="{folder}/clip.mkv" ! decodebin ! qdmdseparate '
+                            f'name=s window-size={WINDOW} s.background', 'RGB')
+    run(folder, 'clip.mkv', *outputs('one'), '--window', WINDOW, '--quiet')
+    for window in range(FRAMES // WINDOW):
+        name = f'one-{window + 1}.png' if window else 'one.png'
+        assert video(folder / name)[0][1] == backgrounds[WINDOW * (window + 1) - 1][1], name
+
+
+def any_number_of_processes(folder):
+    for method in ('robust', 'dmd'):
+        common_words = ['clip.mkv', '--window', WINDOW, '--method', method, '--stretch', 20,
+                        '--warm-up', WINDOW, '--quiet', '--report', 'report.json']
+        run(folder, *common_words, *outputs('alone'))
+        alone = results(folder, 'alone')
+        assert len(alone['mask']) == FRAMES and len(alone) == FRAMES // WINDOW + 2, alone.keys()
+        for name, options in (('jobs', {'words': ['--jobs', 3]}), ('ranks', {'ranks': 3}),
+                              ('both', {'words': ['--jobs', 2], 'ranks': 2})):
+            run(folder, *common_words, *outputs(name), *options.get('words', ()),
+                ranks=options.get('ranks', 0))
+            compare(alone, results(folder, name), f'{method}, {name}')
+            assert not leftovers(folder, name), leftovers(folder, name)
+            report = json.loads((folder / 'report.json').read_text())
+            assert report['frames'] == FRAMES and len(report['stretches']) == 5
+        # In any order, and joined by the last one.
+        for part in (3, 1, 2):
+            assert not (folder / 'parts-mask.mkv').exists()
+            run(folder, *common_words, *outputs('parts'), '--part', f'{part}/3')
+        compare(alone, results(folder, 'parts'), f'{method}, parts')
+        (folder / 'parts-mask.mkv').unlink()
+        # Windows of dmd know nothing of each other.
+        if method == 'dmd':
+            run(folder, *common_words[:5], *outputs('whole'), '--quiet')
+            whole = results(folder, 'whole')
+            for kind in set(whole) - {'mask'}:
+                assert alone[kind] == whole[kind], f'{kind} in stretches, and in one'
+
+
+def irregular(folder, name):
+    """A file whose frames are shown at any times, and depend on many around."""
+    buffers, caps = decoded(folder / 'clip.mkv')
+    pipeline = Gst.parse_launch('appsrc name=source format=time ! x264enc bframes=3 key-int-max=25 '
+                                'option-string="open-gop=1" ! h264parse ! matroskamux ! '
+                                f'filesink location="{folder}/{name}"')
+    source = pipeline.get_by_name('source')
     source.set_caps(caps)
     pipeline.set_state(Gst.State.PLAYING)
-    for t, buffer in enumerate(buffers[first:first + count]):
-        buffer.pts, buffer.duration = t * 40 * Gst.MSECOND, 40 * Gst.MSECOND
+    chance = random.Random(3)
+    for t, buffer in enumerate(buffers):
+        buffer.pts, buffer.duration = (40 * t + chance.randrange(30)) * Gst.MSECOND, 5 * Gst.MSECOND
         source.push_buffer(buffer)
     source.end_of_stream()
-    frames = [bytes_of(sample) for sample in samples_of(end)]
-    message = common.element_message(pipeline, 'qdmdbackground', timeout=0)
+    pipeline.get_bus().timed_pop_filtered(60 * Gst.SECOND, Gst.MessageType.EOS)
     pipeline.set_state(Gst.State.NULL)
-    return frames, message
+    return name
 
 
-def as_the_element(folder, method, alone, solves):
-    for window in (0, 1, 2):
-        # The last window is not full: it has frames of the one before it.
-        first = min(WINDOW * window, FRAMES - WINDOW)
-        mine = slice(WINDOW * window, min(WINDOW * (window + 1), FRAMES))
-        shown = slice(mine.start - first, WINDOW)
-        clip = folder / 'clip.mkv'
-        # A PNG has R, G and B; videos are what the element sends, sample by sample.
-        backgrounds, message = element_of_window(clip, first, WINDOW, method, 'background',
-                                                 '! videoconvert ! video/x-raw,format=RGB')
-        number = f'-{window + 1}.png' if window else '.png'
-        assert alone[0][number] == backgrounds[-1], f'{method}: background of window {window}'
-        eigenvalue = [message.get_double(f'lambda-{part}')[1] for part in ('real', 'imaginary')]
-        assert eigenvalue == solves[window]['lambda'], f'{eigenvalue}, {solves[window]}'
-        foregrounds, _ = element_of_window(clip, first, WINDOW, method, 'foreground')
-        assert foregrounds[shown] == [frame for _, frame in alone[2][mine]], \
-            f'{method}: foreground of window {window}'
-        # What masks learn from the frames before is not there in the last window.
-        if first == WINDOW * window:
-            masks, _ = element_of_window(clip, first, WINDOW, method, 'mask')
-            # The element's are black and white in the video's range.
-            black_and_white = bytes.maketrans(bytes((16, 235)), bytes((0, 255)))
-            assert [mask[:WIDTH * HEIGHT].translate(black_and_white) for mask in masks[shown]] \
-                == [mask for _, mask in alone[1][mine]], \
-                f'{method}: masks of window {window}'
+def frames_are_found_again(folder):
+    """A stretch begins with the same frame whatever the file: none is lost, and none comes twice."""
+    h264 = 'x264enc bframes=3 key-int-max=25 option-string="open-gop=1" ! h264parse'
+    files = {'open.mp4': f'{h264} ! mp4mux', 'open.mkv': f'{h264} ! matroskamux',
+             'open.ts': f'{h264} ! mpegtsmux', 'pictures.avi': 'jpegenc ! avimux',
+             'hidden.webm': 'vp8enc lag-in-frames=16 auto-alt-ref=true deadline=1 '
+                            'keyframe-max-dist=40 ! webmmux'}
+    for name, encoder in files.items():
+        common.play(f'filesrc location="{folder}/clip.mkv" ! decodebin ! {encoder} ! '
+                    f'filesink location="{folder}/{name}"').set_state(Gst.State.NULL)
+    words = ['--window', WINDOW, '--method', 'dmd', '--foreground', 'found.mkv', '--quiet']
+    for recording, frames, by_time in (
+            (['clip.mkv'], FRAMES, True), (['open.mp4'], FRAMES, True), (['open.mkv'], FRAMES, True),
+            ([irregular(folder, 'any.mkv')], FRAMES, True), (['open.ts'], FRAMES, False),
+            (['pictures.avi'], FRAMES, False), (['hidden.webm'], FRAMES, None),
+            (['open.mp4', 'clip.mkv', 'any.mkv'], 3 * FRAMES, True),
+            (['open.mp4', 'open.ts'], 2 * FRAMES, False)):
+        run(folder, *recording, *words)
+        whole = video(folder / 'found.mkv')
+        assert len(whole) == frames, f'{recording}: {len(whole)} frames'
+        run(folder, *recording, *words, '--stretch', 3 * WINDOW, '--part', '2/3')
+        plan = json.loads((folder / 'found.mkv.progress' / 'plan.json').read_text())
+        assert by_time is None or plan['by-time'] == by_time, recording
+        for part in (1, 3):
+            run(folder, *recording, *words, '--stretch', 3 * WINDOW, '--part', f'{part}/3')
+        assert video(folder / 'found.mkv') == whole, recording
 
 
-def one_method(folder, method):
-    alone, solves = any_number_of_processes(folder, method)
-    as_the_element(folder, method, alone, solves)
+def rows_of_windows(folder):
+    """Backgrounds of one process, to the last bit."""
+    for width, height, pixels in ((161, 123, 'I420'), (64, 97, 'BGRx'), (33, 7, 'I422_10LE')):
+        make_clip(folder / 'rows.mkv', 25, width, height, pixels=pixels)
+        for method in ('qdmd', 'dmd'):
+            words = ['rows.mkv', '--window', WINDOW, '--method', method, '--quiet']
+            run(folder, *words, '--background', 'whole.png')
+            for ranks in (0, 2, 3):
+                run(folder, *words, '--by', 'rows', '--background', f'rows{ranks}.png', ranks=ranks)
+                for end in ('.png', '-2.png', '-3.png'):
+                    assert video(folder / f'rows{ranks}{end}') == video(folder / f'whole{end}'), \
+                        f'{method}, {width}x{height}, {ranks} processes: {end}'
+    text = run(folder, 'rows.mkv', '--by', 'rows', '--background', 'r.png', '--window', 4,
+               expect=2)
+    assert 'method=qdmd and dmd' in text, text
+    text = run(folder, 'rows.mkv', '--by', 'rows', '--mask', 'r.mkv', expect=2)
+    assert '--background x.png alone' in text, text
+    # One process's file is another: the job ends, and says why.
+    make_clip(folder / 'short.mkv', 13, 33, 7)
+    words = ['--by', 'rows', '--background', 'r.png', '--window', '10', '--method', 'qdmd']
+    done = subprocess.run([mpirun, '-q', *JOB, '-n', '1', archive, 'rows.mkv', *words, ':', '-n',
+                           '1', archive, 'short.mkv', *words], cwd=folder, capture_output=True,
+                          text=True, timeout=60)
+    assert done.returncode and 'do all machines have the same files' in done.stderr, done.stderr
 
 
 def colours_of_recordings(folder):
-    """Videos have the colours, the chroma and the range of what is read, and 8 bits."""
+    """Videos have the colours, the chroma, the range and the bits of what is read."""
     for pixels, kept, encoder in (
             ('Y42B', 'Y42B', 'avenc_ffv1'), ('Y444', 'Y444', 'avenc_ffv1'),
             ('GRAY8', 'GRAY8', 'avenc_ffv1'), ('BGRx', 'BGRx', 'avenc_ffv1'),
-            ('A420', 'I420', 'avenc_ffv1'), ('YUY2', 'Y42B', 'capsfilter caps=video/x-raw'),
-            ('Y41B', 'Y444', 'avenc_ffv1'), ('I420_10LE', 'I420', 'avenc_ffv1'),
-            ('I422_10LE', 'Y42B', 'avenc_ffv1'), ('I420', 'I420', 'jpegenc quality=100')):
-        clip = folder / f'{pixels}-{encoder[:4]}.mkv'
-        # GStreamer's videocrop leaves out the last V of an odd row.
-        make_clip(clip, WINDOW, WIDTH - (pixels == 'YUY2'), pixels=pixels, encoder=encoder)
-        for processes in (0, 3):
-            run(folder, processes, clip, '--background', folder / f'k{processes}.png',
-                '--cutout', folder / f'k{processes}.mkv', '--window', WINDOW, '--quiet')
-        one, other = (video(folder / f'k{processes}.mkv') for processes in (0, 3))
-        assert one == other, f'{pixels}: cut-outs of one process and of three'
-        assert video(folder / 'k0.png') == video(folder / 'k3.png'), f'{pixels}: backgrounds'
-        caps = decoded(folder / 'k0.mkv')[1].to_string()
+            ('A420', 'A420', 'avenc_ffv1'), ('YUY2', 'Y42B', 'capsfilter caps=video/x-raw'),
+            ('Y41B', 'Y444', 'avenc_ffv1'), ('I420_10LE', 'I420_10LE', 'avenc_ffv1'),
+            ('I422_10LE', 'I422_10LE', 'avenc_ffv1'), ('GRAY16_LE', 'GRAY16_LE', 'avenc_ffv1'),
+            ('I420', 'I420', 'jpegenc quality=100')):
+        make_clip(folder / 'k.mkv', WINDOW, WIDTH, HEIGHT, pixels, encoder=encoder)
+        run(folder, 'k.mkv', '--background', 'k.png', '--cutout', 'kc.mkv', '--window', WINDOW,
+            '--quiet')
+        caps = decoded(folder / 'kc.mkv')[1].to_string()
         assert f'format=(string){kept},' in caps, f'{pixels}: {caps}'
         if pixels != kept:
             continue
-        cutouts, _ = element_of_window(clip, 0, WINDOW, 'robust', 'cutout')
+        cutouts = of_the_element(folder / 'k.mkv', 'cutout', f'window-size={WINDOW}')
+        found = video(folder / 'kc.mkv')
         # The element keeps the byte that nobody looks at.
         if pixels == 'BGRx':
-            cutouts = [[frame[c::4] for c in range(3)] for frame in cutouts]
-            one = [(time, [frame[c::4] for c in range(3)]) for time, frame in one]
-        assert cutouts == [frame for _, frame in one], f'{pixels}: not what the element sends'
+            cutouts, found = ([[frame[c::4] for c in range(3)] for _, frame in frames]
+                              for frames in (cutouts, found))
+        assert cutouts == found, f'{pixels}: not what the element sends'
 
 
 def files_of_other_colours(folder):
-    """All are read as the first one is."""
-    make_clip(folder / 'colour.mkv', 12, seed=5, pixels='BGRx')
-    make_clip(folder / 'grey.mkv', 12, seed=6, pixels='GRAY8')
-    for files, kept in ((('clip', 'colour', 'grey'), 'I420'), (('colour', 'clip'), 'BGRx'),
-                        (('grey', 'clip'), 'GRAY8')):
-        for processes in (0, 2):
-            run(folder, processes, *(folder / f'{name}.mkv' for name in files), '--foreground',
-                folder / f'o{processes}.mkv', '--window', 20, '--quiet')
-        one, other = (video(folder / f'o{processes}.mkv') for processes in (0, 2))
-        assert one == other, f'{files}: one process and two'
-        assert len(one) == 12 * len(files) + (FRAMES - 12), f'{files}: {len(one)} frames'
-        caps = decoded(folder / 'o0.mkv')[1].to_string()
+    """All are read as the first one is, wherever a process begins."""
+    make_clip(folder / 'colour.mkv', 20, seed=5, pixels='BGRx')
+    make_clip(folder / 'grey.mkv', 20, seed=6, pixels='GRAY8')
+    for files, kept in ((('colour', 'clip'), 'BGRx'), (('grey', 'colour', 'clip'), 'GRAY8')):
+        for name, words in (('o1.mkv', []), ('o2.mkv', ['--stretch', WINDOW, '--jobs', 2])):
+            run(folder, *(f'{file}.mkv' for file in files), '--foreground', name, '--window',
+                WINDOW, '--method', 'dmd', '--quiet', *words)
+        assert video(folder / 'o1.mkv') == video(folder / 'o2.mkv'), files
+        caps = decoded(folder / 'o2.mkv')[1].to_string()
         assert f'format=(string){kept},' in caps, f'{files}: {caps}'
 
 
 def what_colours_mean(folder):
-    """It is that of the whole picture, and of the first file: not of a band, nor of a later one."""
-    # Nothing says it in this file. GStreamer takes BT.709 above 576 rows, and a band has fewer.
-    clip = folder / 'high.avi'
-    common.play('qdmdscenesrc scene=basic num-buffers=20 ! '
-                'video/x-raw,width=64,height=600,framerate=25/1 ! videoconvert ! '
-                'video/x-raw,format=I420 ! avenc_mpeg4 bitrate=4000000 ! avimux ! '
-                f'filesink location="{clip}"').set_state(Gst.State.NULL)
-    assert 'colorimetry' not in decoded(clip)[1].to_string()
-    backgrounds, _ = element_of_window(clip, 0, WINDOW, 'robust', 'background',
-                                       '! videoconvert ! video/x-raw,format=RGB')
-    for processes in (0, 2, 3):
-        run(folder, processes, clip, '--background', folder / 'h.png', '--cutout',
-            folder / 'h.mkv', '--window', WINDOW, '--quiet')
-        assert video(folder / 'h.png')[0][1] == backgrounds[-1], f'{processes} processes'
-        caps = decoded(folder / 'h.mkv')[1].to_string()
-        assert 'colorimetry=(string)bt709' in caps, f'{processes} processes: {caps}'
-
+    """It is that of the first file, not of a later one."""
     # White is 235 in the first file, 255 in the JPEGs, and what the first one has in the result.
     def white(path, pixels, encoder):
         end = {'.jpg': 'multifilesink', '.avi': 'avimux ! filesink',
@@ -293,45 +324,23 @@ def what_colours_mean(folder):
     white(whites / 'b%02d.jpg', 'GRAY8', 'jpegenc quality=100')
     for recordings, level in ((('limited.mkv', 'full.avi'), 235), (('full.avi', 'limited.mkv'), 255),
                               (('whites',), 255)):
-        run(folder, 2, *(folder / name for name in recordings), '--background', folder / 'w.mkv',
-            '--window', 6, '--quiet')
+        run(folder, *recordings, '--background', 'w.mkv', '--window', 6, '--quiet', '--jobs', 2,
+            '--stretch', 6)
         frames = [frame[:48 * 36] for _, frame in video(folder / 'w.mkv')]
         assert len(frames) == 12 and all(abs(min(frame) - level) <= 1 for frame in frames), \
             f'{recordings}: {[(min(frame), max(frame)) for frame in frames]}'
     # Grey pictures may come first.
     white(whites / '0%02d.jpg', 'GRAY8', 'jpegenc quality=100')
-    run(folder, 0, whites, '--background', folder / 'w.mkv', '--window', 6, '--quiet')
+    run(folder, whites, '--background', 'w.mkv', '--window', 6, '--quiet')
     assert 'format=(string)BGRx' in decoded(folder / 'w.mkv')[1].to_string()
 
-    # How pixels are shown.
-    clip = folder / 'fields.mkv'
-    make_clip(clip, 12, encoder='capssetter caps=video/x-raw,interlace-mode=interleaved,'
-              'field-order=top-field-first,pixel-aspect-ratio=4/3 ! avenc_ffv1')
-
-    def shown(path, *fields):
-        structure = decoded(path)[1].get_structure(0)
-        return [structure.get_fraction(field)[1:] if field == 'pixel-aspect-ratio'
-                else structure.get_string(field) for field in fields]
-
-    mode, shape = shown(clip, 'interlace-mode', 'pixel-aspect-ratio')
-    assert mode == 'interleaved' and shape[0] > shape[1], (mode, shape)
-    run(folder, 2, clip, '--cutout', folder / 's.mkv', '--mask', folder / 'sm.mkv', '--window', 12,
-        '--quiet')
-    assert shown(folder / 's.mkv', 'interlace-mode', 'pixel-aspect-ratio') == [mode, shape]
-    assert shown(folder / 'sm.mkv', 'pixel-aspect-ratio') == [shape]
-
-
-def rows_that_share_samples(folder):
-    """Bands begin with them, in low pictures, too."""
-    for width, height in ((33, 7), (64, 96), (97, 49), (5, 100)):
-        clip = folder / 'low.mkv'
-        make_clip(clip, 6, width, height)
-        names = [folder / f'r{processes}.mkv' for processes in (0, 2, 3)]
-        for processes, name in zip((0, 2, 3), names):
-            run(folder, processes, clip, '--foreground', name, '--window', 6, '--quiet')
-        whole = video(names[0])
-        for name in names[1:]:
-            assert video(name) == whole, f'{width}x{height}: {name.name}'
+    # How pixels are shown. Two fields are one frame.
+    make_clip(folder / 'fields.mkv', 12, encoder='capssetter caps=video/x-raw,interlace-mode='
+              'interleaved,field-order=top-field-first,pixel-aspect-ratio=4/3 ! avenc_ffv1')
+    run(folder, 'fields.mkv', '--cutout', 's.mkv', '--mask', 'sm.mkv', '--window', 12, '--quiet')
+    for name in ('fields.mkv', 's.mkv', 'sm.mkv'):
+        shape = decoded(folder / name)[1].get_structure(0).get_fraction('pixel-aspect-ratio')
+        assert shape[1] > shape[2], (name, shape)
 
 
 def files_and_pictures(folder):
@@ -356,24 +365,12 @@ def files_and_pictures(folder):
         pipeline.get_by_name('source').end_of_stream()
         pipeline.get_bus().timed_pop_filtered(30 * Gst.SECOND, Gst.MessageType.EOS)
         pipeline.set_state(Gst.State.NULL)
-    options = ['--window', 15, '--method', 'qdmd', '--quiet']
-    run(folder, 2, folder / 'first.mkv', folder / 'second.mkv', *outputs(folder, 'files'), *options)
-    run(folder, 3, pictures, *outputs(folder, 'folder'), *options)
-    run(folder, 0, pictures, *outputs(folder, 'alone'), *options)
+    words = ['--window', WINDOW, '--method', 'dmd', '--stretch', WINDOW, '--quiet']
+    run(folder, 'first.mkv', 'second.mkv', *outputs('files'), *words)
+    run(folder, pictures, *outputs('folder'), *words, '--jobs', 2)
     files = results(folder, 'files')
-    assert len(files[1]) == 33
+    assert len(files['mask']) == 33
     compare(files, results(folder, 'folder'), 'a folder of pictures')
-    compare(files, results(folder, 'alone'), 'one process')
-
-
-def more_outputs(folder):
-    for processes in (0, 2):
-        run(folder, processes, folder / 'clip.mkv', '--background', folder / f'b{processes}.mkv',
-            '--cutout', folder / f'c{processes}.mkv', '--mask', folder / f'm{processes}.mkv',
-            '--shadows', 'marked', '--window', WINDOW, '--quiet')
-    for letter in 'bcm':
-        assert video(folder / f'{letter}0.mkv') == video(folder / f'{letter}2.mkv'), letter
-    assert len(video(folder / 'b0.mkv')) == FRAMES
 
 
 def descendants(process):
@@ -392,147 +389,118 @@ def descendants(process):
     return found
 
 
-def whole_so_far(folder, name):
+def whole_so_far(folder, name, frames):
     """What has its final name is whole."""
     for path in folder.glob(f'{name}*.parts/*.mkv'):
-        assert len(video(path)) in (10, LONG_FRAMES % 10), f'{path} has {len(video(path))} frames'
+        assert len(video(path)) in (10, frames % 10), f'{path} has {len(video(path))} frames'
     for path in folder.glob(f'{name}*.mkv'):
         if path.is_file():
-            assert len(video(path)) == LONG_FRAMES, path
+            assert len(video(path)) == frames, path
     for path in folder.glob(f'{name}*.png'):
         assert len(video(path)) == 1, path
 
 
+def stretches_done(folder, name):
+    return len(list((folder / f'{name}.png.progress').glob('*.done')))
+
+
+KILLED = ['long.mkv', '--window', 10, '--stretch', 10, '--warm-up', 10, '--quiet']
+LONG_FRAMES = 97
+
+
+def undisturbed_results(folder):
+    if not (folder / 'undisturbed.png').exists():
+        run(folder, *KILLED, *outputs('undisturbed'), '--jobs', 2)
+    return results(folder, 'undisturbed')
+
+
 def killed_and_resumed(folder):
-    clip = folder / 'long.mkv'
-    options = ['--window', 10, '--method', 'robust', '--quiet']
     start = time.monotonic()
-    run(folder, 2, clip, *outputs(folder, 'undisturbed'), *options)
+    undisturbed = undisturbed_results(folder)
     takes = time.monotonic() - start
-    undisturbed = results(folder, 'undisturbed')
-    assert len(undisturbed[1]) == LONG_FRAMES
+    assert len(undisturbed['mask']) == LONG_FRAMES
     chance = random.Random(27)
     resumed = 0
     for kill in range(10 if LONG else 4):
-        # Some kills come before the first window, and some after the last: a job begins anew then.
-        job = subprocess.Popen(command(chance.choice((1, 2, 3)), clip, *outputs(folder, 'killed'),
-                                       *options, '--resume'),
+        # Some kills come before the first stretch is done, and some after the last.
+        ranks = chance.choice((0, 2))
+        words = ['--jobs', chance.choice((1, 3))] if ranks == 0 else []
+        job = subprocess.Popen(command(*KILLED, *outputs('killed'), *words, '--resume',
+                                       ranks=ranks),
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
         time.sleep(chance.uniform(0.3, 0.8) * takes)
         processes = descendants(job.pid)
-        # All at once, or one of the job's own processes, which ends the job.
-        for process in processes if kill % 2 == 0 else processes[-1:]:
+        # All at once, or the one that was started first.
+        for process in processes if kill % 2 == 0 else processes[:1]:
             try:
                 os.kill(process, signal.SIGKILL)
             except ProcessLookupError:
                 pass
         job.wait(300)
-        progress = folder / 'killed.png.progress'
-        resumed += progress.exists() and json.loads(progress.read_text())['windows'] > 0
-        whole_so_far(folder, 'killed')
-    run(folder, 2, clip, *outputs(folder, 'killed'), *options, '--resume')
+        # What mpirun started goes on without it.
+        while any(pathlib.Path(f'/proc/{process}').exists() for process in processes):
+            time.sleep(0.05)
+        resumed += stretches_done(folder, 'killed') > 0
+        whole_so_far(folder, 'killed', LONG_FRAMES)
+    run(folder, *KILLED, *outputs('killed'), '--jobs', 2, '--resume')
     compare(undisturbed, results(folder, 'killed'), f'{resumed} times resumed')
     assert not leftovers(folder, 'killed'), leftovers(folder, 'killed')
-    print(f'# {resumed} of the killed jobs had finished windows', flush=True)
+    print(f'# {resumed} of the killed jobs had finished stretches', flush=True)
+
+
+def a_process_that_dies(folder):
+    """Others do its stretch, without anybody's help."""
+    job = subprocess.Popen(command(*KILLED, *outputs('died'), '--jobs', 2), cwd=folder,
+                           stderr=subprocess.PIPE, text=True)
+    while stretches_done(folder, 'died') == 0 and job.poll() is None:
+        time.sleep(0.01)
+    os.kill(descendants(job.pid)[-1], signal.SIGKILL)
+    said = job.communicate(timeout=240)[1]
+    assert job.returncode == 0 and 'its stretch is done again' in said, said
+    compare(undisturbed_results(folder), results(folder, 'died'), 'a process died')
+
+
+def several_commands_share_a_job(folder):
+    """A second one takes what is free, too."""
+    words = [*KILLED, *outputs('shared'), '--resume']
+    first = subprocess.Popen(command(*words), cwd=folder)
+    while not (folder / 'shared.png.progress' / 'plan.json').exists() and first.poll() is None:
+        time.sleep(0.01)
+    run(folder, *words)
+    assert first.wait(240) == 0
+    compare(undisturbed_results(folder), results(folder, 'shared'), 'two commands')
+    assert not leftovers(folder, 'shared'), leftovers(folder, 'shared')
 
 
 def killed_while_parts_are_removed(folder):
     """What the joined videos were made of is gone in part: they are whole all the same."""
-    clip = folder / 'long.mkv'
-    options = ['--window', 10, '--method', 'robust', '--quiet', '--resume']
-    job = subprocess.Popen(command(1, clip, *outputs(folder, 'joined'), *options),
-                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
-    progress = folder / 'joined.png.progress'
-    known = None
-    while known is None and job.poll() is None:
-        known = progress.read_text() if progress.exists() else None
-        time.sleep(0.01)
-    assert job.wait(300) == 0 and known
+    for part in (1, 2):
+        run(folder, *KILLED, *outputs('joined'), '--part', f'{part}/3')
+    text = run(folder, *KILLED, *outputs('joined'), '--join', expect=1)
+    assert '3 of 10 stretches are not done yet' in text, text
+    shutil.copytree(folder / 'joined.png.progress', folder / 'kept')
+    run(folder, *KILLED, *outputs('joined'), '--part', '3/3')
     whole = results(folder, 'joined')
-    state = json.loads(known)
-    state.update(windows=-(-LONG_FRAMES // 10), frames=LONG_FRAMES, ended=True, joined=True)
-    progress.write_text(json.dumps(state))
+    plan = json.loads((folder / 'kept' / 'plan.json').read_text())
+    plan['joined'] = True
+    (folder / 'kept' / 'plan.json').write_text(json.dumps(plan))
+    shutil.move(folder / 'kept', folder / 'joined.png.progress')
     parts = folder / 'joined-mask.mkv.parts'
     parts.mkdir()
     (parts / '00000002.mkv').write_bytes(b'one of those that are left')
-    run(folder, 1, clip, *outputs(folder, 'joined'), *options)
+    run(folder, *KILLED, *outputs('joined'), '--resume')
     compare(whole, results(folder, 'joined'), 'as it was')
     assert not leftovers(folder, 'joined'), leftovers(folder, 'joined')
 
 
 def resumed_with_other_options(folder):
-    clip = folder / 'long.mkv'
-    job = subprocess.Popen(command(1, clip, *outputs(folder, 'other'), '--window', 10, '--quiet'),
-                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
-    progress = folder / 'other.png.progress'
-    while not progress.exists() and job.poll() is None:
-        time.sleep(0.01)
-    for process in descendants(job.pid):
-        os.kill(process, signal.SIGKILL)
-    job.wait(300)
-    text = run(folder, 1, clip, *outputs(folder, 'other'), '--window', 12, '--resume', expect=1)
-    assert 'other options' in text, text
-
-
-def memory_of_processes(folder):
-    width, height, frames = 1280, 721, 100
-    window = 3 * width * height * frames
-    # Meson's tests touch all that is taken, and what a window may need at most is taken.
-    untouched = {name: value for name, value in os.environ.items() if name != 'MALLOC_PERTURB_'}
-    for pixels in ('I420', 'BGRx'):
-        clip = folder / f'large-{pixels}.mkv'
-        make_clip(clip, frames, width, height, pixels)
-        # The short form has what takes more of RGB.
-        for method in ('qdmd', 'robust') if LONG or pixels == 'I420' else ('robust',):
-            for processes in (1, 2, 3, 4) if LONG else (2,):
-                most = {}
-                for size in (2, frames):
-                    run(folder, processes, clip, '--background', folder / 'm.png', '--window',
-                        size, '--method', method, '--report', folder / 'm.json', '--quiet',
-                        env=untouched)
-                    report = json.loads((folder / 'm.json').read_text())
-                    most[size] = report['of-process']['most-memory']
-                # Besides what decoding takes, and buffers of one frame.
-                shares = [(whole - bare) / window for whole, bare in zip(most[frames], most[2])]
-                what = f'{method}, {pixels}, {processes} processes'
-                print(f'# {what}: ' + ' '.join(f'{share:.3f}' for share in shares), flush=True)
-                # A window in I420 is half as large.
-                part = 1 if pixels == 'BGRx' else 0.5
-                assert max(shares) <= part * (1 / processes + 0.1), f'{what}: {shares}'
-
-
-def memory_of_frames_is_used_again(folder):
-    clip, faults = folder / 'frames.mkv', []
-    make_clip(clip, 40, 1280, 721)
-    for times in (1, 3):
-        run(folder, 0, *[clip] * times, '--background', folder / 'f.png', '--window', 10,
-            '--report', folder / 'f.json', '--quiet')
-        faults += json.loads((folder / 'f.json').read_text())['of-process']['page-faults']
-    # One frame as it is decoded has 338 pages, and many frames are on their way at once.
-    more = (faults[1] - faults[0]) / 80
-    print(f'# {more:.1f} page faults a frame', flush=True)
-    assert more < 30, f'{faults}: {more} page faults a frame'
-
-
-def failing_process(folder):
-    """One process's file is another: the job ends, and says why."""
-    def two(first, second):
-        words = [str(word) for word in (*outputs(folder, 'fails'), '--window', 10, '--quiet')]
-        done = subprocess.run([mpirun, '-q', *JOB, '-n', '1', archive, str(first), *words, ':',
-                               '-n', '1', archive, str(second), *words],
-                              cwd=folder, capture_output=True, text=True, timeout=60)
-        assert done.returncode != 0, f'it ended well: {done.stdout}{done.stderr}'
-        return done.stderr
-
-    clip = folder / 'long.mkv'
-    make_clip(folder / 'short.mkv', 13)
-    said = two(clip, folder / 'short.mkv')
-    assert 'do all machines have the same files' in said, said
-    (folder / 'broken.mkv').write_bytes(b'nothing of the kind' * 1000)
-    said = two(clip, folder / 'broken.mkv')
-    assert 'broken.mkv cannot be decoded' in said and 'process 1' in said, said
-    said = two(clip, folder / 'missing.mkv')
-    assert 'missing.mkv' in said, said
+    run(folder, *KILLED, *outputs('other'), '--part', '1/2')
+    for words in (['--resume'], ['--part', '2/2']):
+        text = run(folder, *KILLED, *outputs('other'), '--shadows', 'foreground', *words, expect=1)
+        assert 'other options' in text, text
+    # It begins anew: what another one had done is forgotten.
+    run(folder, *KILLED, *outputs('other'), '--shadows', 'foreground')
+    assert not leftovers(folder, 'other'), leftovers(folder, 'other')
 
 
 def pictures_of(folder, name, kind='png'):
@@ -568,20 +536,19 @@ def what_is_read_stays(folder):
                   [temporary, '--mask', 't.mkv'],
                   [folder / 'later-2.png', '--background', 'later.png'],
                   [folder / 'later.lnk.png', '--background', 'later.png']):
-        for processes in (0, 2):
-            text = run(folder, processes, *words, '--window', 4, expect=1)
-            assert 'would be among what is read' in text, f'{words}: {text}'
-    text = run(folder, 0, part, '--mask', 'n.mkv', expect=1)
+        text = run(folder, *words, '--window', 4, expect=1)
+        assert 'would be among what is read' in text, f'{words}: {text}'
+    text = run(folder, part, '--mask', 'n.mkv', expect=1)
     assert 'move it first' in text, text
     assert {path: path.read_bytes() for path in read} == before
-    text = run(folder, 0, clip, '--mask', 'm.mkv', '--report', './m.mkv', expect=2)
+    text = run(folder, clip, '--mask', 'm.mkv', '--report', './m.mkv', expect=2)
     assert 'twice' in text, text
     # Names that only look alike.
-    run(folder, 0, shots / '01.png', '--background', '01.png', '--quiet')
+    run(folder, shots / '01.png', '--background', '01.png', '--quiet')
     # A report goes where somebody waits for it.
     os.mkfifo(folder / 'pipe')
     reader = subprocess.Popen(['cat', folder / 'pipe'], stdout=subprocess.PIPE, text=True)
-    run(folder, 0, clip, '--background', 'p.png', '--report', 'pipe', '--quiet')
+    run(folder, clip, '--background', 'p.png', '--report', 'pipe', '--quiet')
     assert json.loads(reader.communicate(timeout=60)[0])['frames'] == 12
 
 
@@ -600,101 +567,92 @@ def write_deep_png(path, size=40):
 def pictures_that_are_odd(folder):
     (folder / 'deep').mkdir()
     write_deep_png(folder / 'deep' / '1.png')
-    text = run(folder, 0, folder / 'deep', '--background', 'n.png', expect=1)
+    text = run(folder, folder / 'deep', '--background', 'n.png', expect=1)
     assert 'convert it to 8 bits' in text, text
     # A name that is no text.
     strange = os.fsdecode(b'u\xff')
     clip = folder / (strange + '.mkv')
     shutil.copy(folder / 'clip.mkv', clip)
-    run(folder, 0, clip, *outputs(folder, strange), '--window', 20, '--quiet', '--resume')
+    run(folder, clip, *outputs(strange), '--window', 20, '--quiet', '--resume')
     assert not leftovers(folder, strange)
     for kind in ('png', 'jpg'):
         made = pictures_of(folder, 'none-' + kind, kind)
         (made / f'03.{kind}').write_bytes(b'')
-        for processes in (0, 2):
-            text = run(folder, processes, made, '--background', 'n.png', expect=1)
+        for jobs in (1, 2):
+            text = run(folder, '--jobs', jobs, made, '--background', 'n.png', expect=1)
             assert f'03.{kind} is empty' in text, text
     for kind in ('png', 'jpg'):
         cut = pictures_of(folder, 'cut-' + kind, kind)
         last = cut / f'05.{kind}'
         whole = last.read_bytes()
         last.write_bytes(whole + b'what \xff\xd8\xff\xda a camera adds')
-        run(folder, 0, cut, '--background', 'n.png', '--window', 4, '--quiet')
+        run(folder, cut, '--background', 'n.png', '--window', 4, '--quiet')
         last.write_bytes(whole[:len(whole) // 2])
-        text = run(folder, 0, cut, '--background', 'n.png', expect=1)
+        text = run(folder, cut, '--background', 'n.png', expect=1)
         assert f'05.{kind} is cut off' in text, text
 
 
 def a_recording_that_is_cut_off(folder):
     clip = folder / 'whole.mkv'
     make_clip(clip, 100)
-    text = run(folder, 0, clip, '--background', 'w.png', '--window', 50)
+    text = run(folder, clip, '--background', 'w.png', '--window', 50)
     assert 'cut off' not in text, text
     whole = clip.read_bytes()
     (folder / 'half.mkv').write_bytes(whole[:len(whole) // 2])
-    text = run(folder, 2, folder / 'half.mkv', '--background', 'w.png', '--window', 50)
+    text = run(folder, '--jobs', 2, folder / 'half.mkv', '--background', 'w.png', '--window', 50)
     assert text.count('of 4 s: is it cut off?') == 1, text
 
 
 def errors(folder):
-    clip = folder / 'clip.mkv'
     for words, reason in (
-            ([clip, '--mask', 'm.mkv', '--report', 'no/folder/r.json'], 'r.json cannot'),
-            ([clip, '--mask', 'no/folder/mask.mkv'], 'no/folder')):
-        for processes in (0, 2):
-            text = run(folder, processes, *words, expect=1)
+            (['clip.mkv', '--mask', 'm.mkv', '--report', 'no/folder/r.json'], 'r.json cannot'),
+            (['clip.mkv', '--mask', 'no/folder/mask.mkv'], 'no/folder'),
+            (['clip.mkv', '--mask', 'm.mkv', '--max-memory', 1000], 'max-memory allows 1000')):
+        for jobs in (1, 2):
+            text = run(folder, *words, '--jobs', jobs, expect=1)
             assert reason in text, f'{words}: {text}'
     for words, reason in (
-            ([clip, '--mask', 'm.mkv', '--absorb-time', 'nan'], 'finite'),
-            ([clip], 'nothing is to be written'),
-            ([clip, '--mask', 'mask.png'], '.mkv'),
-            ([clip, '--mask', 'mask.avi'], '.mkv'),
-            ([clip, '--mask', 'one.mkv', '--foreground', 'one.mkv'], 'twice'),
-            ([clip, '--background', 'b.png', '--method', 'magic'], '--method'),
-            ([clip, '--background', 'b.png', '--window', 1], '--window'),
-            ([folder, '--background', 'b.png', '--window', 1], '--window'),
-            ([folder / 'none.mkv', '--background', 'b.png'], 'none.mkv')):
-        for processes in (0, 2):
-            text = run(folder, processes, *words, expect=2)
-            assert reason in text, f'{words}: {text}'
-    common.play('videotestsrc num-buffers=5 ! video/x-raw,format=BGRx,width=64,height=3 ! '
-                f'avenc_ffv1 ! matroskamux ! filesink location="{folder}/low.mkv"'
-                ).set_state(Gst.State.NULL)
-    text = run(folder, 4, folder / 'low.mkv', '--background', 'b.png', expect=1)
-    assert 'start fewer' in text, text
-    # What fails while the next window is read ends the job, too. It begins anew: what another one
-    # had done is forgotten.
+            (['clip.mkv', '--mask', 'm.mkv', '--absorb-time', 'nan'], '--absorb-time'),
+            (['clip.mkv'], 'nothing is to be written'),
+            (['clip.mkv', '--mask', 'mask.png'], '.mkv'),
+            (['clip.mkv', '--mask', 'mask.avi'], '.mkv'),
+            (['clip.mkv', '--mask', 'one.mkv', '--foreground', 'one.mkv'], 'twice'),
+            (['clip.mkv', '--background', 'b.png', '--method', 'magic'], 'qdmd, dmd or robust'),
+            (['clip.mkv', '--background', 'b.png', '--window', 1], '--window'),
+            (['clip.mkv', '--background', 'b.png', '--part', '4/3'], '--part'),
+            (['none.mkv', '--background', 'b.png'], 'none.mkv')):
+        text = run(folder, *words, expect=2)
+        assert reason in text, f'{words}: {text}'
+    (folder / 'broken.mkv').write_bytes(b'nothing of the kind' * 1000)
+    for options in ({}, {'ranks': 2}):
+        text = run(folder, 'broken.mkv', '--mask', 'm.mkv', expect=1, **options)
+        assert 'broken.mkv cannot be decoded' in text, text
+    make_clip(folder / 'other.mkv', 12, 64, 48)
+    text = run(folder, 'clip.mkv', 'other.mkv', '--mask', 'm.mkv', '--window', 10, expect=1)
+    assert 'a recording has one size' in text, text
+    # What fails at the end of a stretch ends the job, too.
     (folder / 'taken.png' / 'inside').mkdir(parents=True)
-    progress = folder / 'taken.png.progress'
-    progress.write_text('{}')
-    text = run(folder, 0, folder / 'low.mkv', '--background', 'taken.png', '--window', 2, expect=1)
+    text = run(folder, 'clip.mkv', '--background', 'taken.png', '--window', 10, expect=1)
     assert 'taken.png' in text, text
-    assert not progress.exists()
-    (folder / 'taken.png' / 'inside').rmdir()
-    (folder / 'taken.png').rmdir()
-    assert '--window' in run(folder, 0, '--help')
+    assert '--window' in run(folder, '--help')
 
 
 def main():
-    cases = [(f'{method} of any number of processes, and of the element', one_method, method)
-             for method in ('qdmd', 'dmd', 'robust')]
-    cases += [(check.__name__.replace('_', ' '), check)
-              for check in (colours_of_recordings, files_of_other_colours,
-                            rows_that_share_samples, what_colours_mean,
-                            files_and_pictures, more_outputs, killed_and_resumed,
-                            killed_while_parts_are_removed, resumed_with_other_options,
-                            what_is_read_stays, pictures_that_are_odd,
-                            a_recording_that_is_cut_off,
-                            memory_of_processes, memory_of_frames_is_used_again,
-                            failing_process, errors)]
+    cases = [(check.__name__.replace('_', ' '), check)
+             for check in (one_stretch_is_the_element, any_number_of_processes,
+                           frames_are_found_again, rows_of_windows, colours_of_recordings,
+                           files_of_other_colours, what_colours_mean, files_and_pictures,
+                           killed_and_resumed, a_process_that_dies, several_commands_share_a_job,
+                           killed_while_parts_are_removed, resumed_with_other_options,
+                           what_is_read_stays, pictures_that_are_odd, a_recording_that_is_cut_off,
+                           errors)]
     words = sys.argv[3:]
     cases = [case for case in cases if not words or any(word in case[0] for word in words)]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         make_clip(folder / 'clip.mkv')
-        make_clip(folder / 'long.mkv', LONG_FRAMES, 321, 243)
-        return common.report([(case, lambda check=check, words=words: check(folder, *words))
-                              for case, check, *words in cases])
+        make_clip(folder / 'long.mkv', LONG_FRAMES, 322, 242)
+        return common.report([(case, lambda check=check: check(folder)) for case, check in cases])
 
 
 sys.exit(main())

@@ -405,7 +405,7 @@ TEST(DeepMasks, FindWhatHighBitsDoNotShow) {
   ASSERT_TRUE(engine.drain().ok());
   for (int t = 0; t < kLength; ++t) {
     ASSERT_TRUE(engine.next());
-    const uint8_t* const mask = engine.next()->whole_mask();
+    const uint8_t* const mask = engine.next()->mask();
     int wrong = 0;
     for (int y = 0; y < kSide; ++y)
       for (int x = 0; x < kSide; ++x) wrong += (mask[y * kSide + x] != 0) != inside(t, x, y);

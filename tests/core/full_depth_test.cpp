@@ -52,7 +52,7 @@ TEST(FullDepth, LimitsOfPixelsAreComparedWithWholeSamples) {
                           &model,
                           threshold};
       frame.limits = limits.data();
-      Decision decision(kWide, Band(kHigh), Colours::rgb, steps);
+      Decision decision(kWide, kHigh, Colours::rgb, steps);
       decision.decide(frame, nullptr);
       size_t foreground = 0;
       for (size_t p = 0; p < kAll; ++p) {

@@ -85,7 +85,7 @@ TEST(Cells, MeansOfSharedSamplesAreThoseOfTheirPixels) {
           for (auto* plane : {&brightness, &first, &second}) fill(plane, height > 90, &rng);
           const uint8_t* const planes[] = {brightness.data(), first.data(), second.data()};
           GridFrames cells(grid, 2);
-          find_own_cells(grid, Band(height), KeptPicture(planes, shape), &cells, 1, &pool);
+          find_cells(grid, KeptPicture(planes, shape), &cells, 1, &pool);
           for (int c = 0; c < kChannels; ++c)
             for (int row = 0; row < grid.rows; ++row)
               for (int col = 0; col < grid.cols; ++col)
@@ -114,7 +114,7 @@ TEST(Cells, MayBeWiderThanWhatIsSummedTogether) {
       for (uint8_t& sample : *plane) sample = static_cast<uint8_t>(rng() % 256);
     const uint8_t* const planes[] = {brightness.data(), chroma.data(), chroma.data()};
     GridFrames cells(grid, 1);
-    find_own_cells(grid, Band(1), KeptPicture(planes, shape), &cells, 0, nullptr);
+    find_cells(grid, KeptPicture(planes, shape), &cells, 0, nullptr);
     for (int col = 0; col < grid.cols; ++col) {
       ASSERT_EQ(cells.plane(0, 0)[col],
                 mean_of(grid, 0, col, [&](int x, int) { return planes[0][x]; }));

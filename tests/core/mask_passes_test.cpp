@@ -239,21 +239,6 @@ TEST(MeanDistance, FollowsBackgroundAndWhatComesForAMoment) {
   EXPECT_GT(others, 50u);
 }
 
-// As processes that share a window send them to each other.
-TEST(MaskRuns, ComeBackFromBits) {
-  std::mt19937 rng(412);
-  for (size_t count : {1, 7, 8, 9, 64, 1001}) {
-    std::vector<uint8_t> mask(count), bits((count + 7) / 8, 0xA5), back(count + 1, 7);
-    for (uint8_t& sample : mask) sample = rng() % 3 == 0 ? 255 : 0;
-    pack_mask(mask.data(), count, bits.data());
-    for (size_t p = 0; p < 8 * bits.size(); ++p)
-      ASSERT_EQ(is_masked(bits.data(), p), p < count && mask[p] == 255) << p << " of " << count;
-    unpack_mask(bits.data(), count, back.data());
-    ASSERT_TRUE(std::equal(mask.begin(), mask.end(), back.begin())) << count;
-    ASSERT_EQ(back[count], 7) << count;
-  }
-}
-
 TEST(Specks, AreCountedByFlooding) {
   std::mt19937 rng(329);
   for (auto [width, height] : {std::pair{1, 1}, {40, 30}, {300, 3}, {2, 200}, {97, 64}})

@@ -89,7 +89,7 @@ TEST_P(PartsMemory, OfAPicture) {
       kLittle);
   expect(
       "MovingTexture", MovingTexture::bytes(width, height),
-      [&] { MovingTexture part(width, Band(height)); }, kLittle);
+      [&] { MovingTexture part(width, height); }, kLittle);
 }
 
 TEST_P(PartsMemory, OfAWindow) {

@@ -173,14 +173,6 @@ TEST_P(WaitingFrames, WhatWasAbsorbedIsNoForeground) {
   for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
 }
 
-// Windows of an archive are solved by themselves, so that a job can go on anywhere.
-TEST_P(WaitingFrames, WindowsThatRememberNothingAreNotRevised) {
-  EngineOptions options = this->options();
-  options.remembers = false;
-  const Left left = run(bag([](int t) { return t < 60; }), options);
-  for (int t = 0; t < kWindow; ++t) EXPECT_LT(left.white[static_cast<size_t>(t)], 0.1) << t;
-}
-
 // People who hold a background want the one that there is.
 TEST_P(WaitingFrames, WhatIsHeldStaysAsItIs) {
   for (int freeze_at : {0, 45, 55}) {

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Puts what qdmd-archive takes in time, memory and bytes into docs/archive.md anew, and the model that
-# follows from it. Takes some fifteen minutes of a machine that does nothing else, and 5 GB of memory.
+# Puts what qdmd-archive takes in time into docs/archive.md anew, how far masks of parts are those of
+# one piece, and the model that follows. Takes some forty minutes of a machine that does nothing else.
 #
-#   tests/pages/archive.sh [PAGE [memory]]    PAGE: another copy of docs/archive.md; memory: its table only
-#   QDMD_ARCHIVE_FRAMES=200 QDMD_ARCHIVE_TURNS=1   less of both
+#   tests/pages/archive.sh [PAGE]    PAGE: another copy of docs/archive.md
+#   QDMD_ARCHIVE_TIMES=2 QDMD_ARCHIVE_TURNS=1   a shorter film, and less of it
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 find_sequences
 tests/install-dependencies.sh build test demo
 build gst/libgstqdmd.so gst/libgstqdmdscene.so examples/archive/qdmd-archive
 uptime >"$results/load-before"
-/usr/bin/python3 tests/pages/archive_page.py "${1:-docs/archive.md}" "$(street_video)" "$results" "${@:2}"
+/usr/bin/python3 tests/pages/archive_page.py "${1:-docs/archive.md}" "$(street_video)" "$results"

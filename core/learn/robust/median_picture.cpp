@@ -9,19 +9,10 @@ namespace qdmd {
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
                     uint8_t* spread, const SampleRange& range) {
-  median_picture(grid, Band(grid.height), stable, frames, pool, background, spread, range);
-}
-
-void median_picture(const Grid& grid, const Band& band, const StableFrames& stable,
-                    const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread, const SampleRange& range) {
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
-    // Rows are counted among those that are kept.
-    const int top = std::max(grid.top(row) - band.first(), 0),
-              bottom = std::min(grid.top(row + 1) - band.first(), band.rows());
-    if (top >= bottom) return;
+    const int top = grid.top(row), bottom = grid.top(row + 1);
     for (int col = 0; col < grid.cols; ++col) {
       const auto shown =
           stable.of_cell[part * static_cast<size_t>(grid.cols) + static_cast<size_t>(col)];

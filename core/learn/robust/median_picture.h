@@ -21,9 +21,5 @@ struct LitPicture {
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
                     uint8_t* spread, const SampleRange& range = {});
-// As above, where planes have the band's rows only.
-void median_picture(const Grid& grid, const Band& band, const StableFrames& stable,
-                    const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread, const SampleRange& range = {});
 
 }  // namespace qdmd

@@ -192,9 +192,7 @@ void FrameFollower::replace(const std::vector<int>& cells, const StandingLooks& 
   for (int cell : cells) {
     const int row = cell / context_.grid.cols, col = cell % context_.grid.cols;
     const int left = context_.grid.left(col), right = context_.grid.left(col + 1);
-    for (int y = std::max(context_.grid.top(row) - context_.band.first(), 0);
-         y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
-         ++y)
+    for (int y = context_.grid.top(row); y < context_.grid.top(row + 1); ++y)
       for (int x = left; x < right; x += kMedianBlock) {
         const auto width = static_cast<size_t>(std::min(kMedianBlock, right - x));
         const size_t first = static_cast<size_t>(y) * stride + static_cast<size_t>(x);

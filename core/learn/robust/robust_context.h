@@ -12,15 +12,14 @@ namespace qdmd {
 struct RobustContext {
   LearnOptions options;
   RobustParameters parameters;
-  Band band;
-  Grid grid;  // of the whole picture
+  Grid grid;
   int finest_step = 1, step = 1;
   LearnerRoom room = {};
   RgbColours rgb = {options.colours, options.levels};
 
   // What is kept of each frame.
   FrameContents contents() const {
-    FrameContents contents = {1, parameters.cells_along, 1, 1, options.depth, rgb};
+    FrameContents contents = {1, parameters.cells_along, 1, 1, options.depth, 0, rgb};
     if (options.keeps_shared()) {
       contents.chroma_columns = options.chroma_columns;
       contents.chroma_rows = options.chroma_rows;
@@ -30,7 +29,7 @@ struct RobustContext {
   // The shape of kept frames.
   ChromaShape shape() const {
     const FrameContents of = contents();
-    return {grid.width, band.rows(), of.chroma_columns, of.chroma_rows};
+    return {grid.width, grid.height, of.chroma_columns, of.chroma_rows};
   }
   // Light is a gain of R, G and B: of Y, U and V it is the same one, that of brightness.
   bool one_gain() const { return options.colours == Colours::yuv; }
@@ -51,15 +50,10 @@ struct RobustContext {
     rgb.convert(cells->cells(), cells->channels(frame).data());
   }
   size_t pixels() const {
-    return static_cast<size_t>(grid.width) * static_cast<size_t>(band.rows());
+    return static_cast<size_t>(grid.width) * static_cast<size_t>(grid.height);
   }
-  size_t samples_at(int of_step) const {
-    return static_cast<size_t>(band.samples(of_step)) * sample_count(grid.width, of_step);
-  }
-  // Own rows, counted among those that are kept.
-  SampledRows sampled_rows() const {
-    return {band.first_sample(step) - band.first(), band.own_end() - band.first(), step};
-  }
+  size_t samples_at(int of_step) const { return sample_count(grid.width, grid.height, of_step); }
+  SampledRows sampled_rows() const { return {0, grid.height, step}; }
   // Windows that know nothing of each other are given nothing of each other.
   bool follows(Models models) const {
     return models == Models::two_of_live || parameters.earlier_share > 0;

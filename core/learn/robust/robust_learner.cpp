@@ -19,13 +19,11 @@ int chosen_step(int width, int height) {
 
 }  // namespace
 
-static RobustContext context_of(const LearnOptions& options, int width, const Band& band,
+static RobustContext context_of(const LearnOptions& options, int width, int height,
                                 const RobustParameters& parameters) {
-  const int finest =
-      options.sample_step > 0 ? options.sample_step : chosen_step(width, band.height());
-  RobustContext context = {options, parameters,
-                           band,    Grid(width, band.height(), parameters.cells_along),
-                           finest,  finest};
+  const int finest = options.sample_step > 0 ? options.sample_step : chosen_step(width, height);
+  RobustContext context = {options, parameters, Grid(width, height, parameters.cells_along), finest,
+                           finest};
   // Levels are those of R, G and B.
   const double level = level_of(options.colours);
   for (int* of : {&context.parameters.least_threshold, &context.parameters.least_limit})
@@ -33,14 +31,12 @@ static RobustContext context_of(const LearnOptions& options, int width, const Ba
   // What the paper fits to the first frame depends on what stood there.
   context.options.dmd.amplitude = Amplitude::window;
   if (context.options.dmd.rank == 0) context.options.dmd.rank = 1;
-  if (!options.remembers)
-    context.parameters.earlier_share = context.parameters.remembered_share = 0;
   return context;
 }
 
-RobustLearner::RobustLearner(const LearnOptions& options, int width, const Band& band,
+RobustLearner::RobustLearner(const LearnOptions& options, int width, int height,
                              const RobustParameters& parameters)
-    : context_(context_of(options, width, band, parameters)),
+    : context_(context_of(options, width, height, parameters)),
       memory_(context_),
       history_(context_),
       solve_(context_),
@@ -168,9 +164,8 @@ void RobustLearner::build(Slice, BackgroundModel* model) {
     const uint8_t* const level[kChannels] = {solve_.reference().level[0].data(),
                                              solve_.reference().level[1].data(),
                                              solve_.reference().level[2].data()};
-    find_own_cells(context_.grid, context_.band, level, cells, next, context_.room.pool);
+    find_cells(context_.grid, level, cells, next, context_.room.pool);
     context_.rgb.convert(cells->cells(), cells->channels(next).data());
-    share_cells(context_.grid, context_.band, cells, next);
     model->set_gains(solve_.gains_of_frames(*cells, next));
     memory_.take(solve_, *cells, next, history_);
     solve_.write_limits(model->make_limits());

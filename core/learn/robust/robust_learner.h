@@ -22,11 +22,8 @@ namespace qdmd {
 // from sampled pixels, exactly; the pictures of the modes are combined from all.
 class RobustLearner : public Learner {
  public:
-  RobustLearner(const LearnOptions& options, int width, const Band& band,
+  RobustLearner(const LearnOptions& options, int width, int height,
                 const RobustParameters& parameters = {});
-
-  // Pixels of a band's background depend on rows so far from them.
-  static int reach(const LearnOptions& options) { return kMaskReach * options.iterations; }
 
   FrameContents contents() const override { return context_.contents(); }
   std::vector<int> sample_steps() const override;

@@ -68,9 +68,7 @@ void SolveHistory::take_out(int64_t number, uint8_t* bits) const {
   for (const KnownForeground& known : known_foreground_) {
     if (number < known.first || number > known.last) continue;
     const int row = known.cell / context_.grid.cols, col = known.cell % context_.grid.cols;
-    for (int y = std::max(context_.grid.top(row) - context_.band.first(), 0);
-         y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
-         ++y) {
+    for (int y = context_.grid.top(row); y < context_.grid.top(row + 1); ++y) {
       const size_t line = static_cast<size_t>(y) * static_cast<size_t>(context_.grid.width);
       set_bits(line + static_cast<size_t>(context_.grid.left(col)),
                line + static_cast<size_t>(context_.grid.left(col + 1)), bits);

@@ -30,7 +30,7 @@ void WindowSolve::begin() {
   samples_ = Window(snapshots, context_.samples_at(context_.finest_step));
   gram_ = SlidingGram(snapshots, room.pool);
   reference_.width = context_.grid.width;
-  reference_.height = context_.band.rows();
+  reference_.height = context_.grid.height;
   for (auto& level : reference_.level) level.resize(pixels);
   reference_.threshold.resize(pixels);
   spread_.resize(pixels);
@@ -188,8 +188,7 @@ Decomposition WindowSolve::decompose_filled() {
   DmdOptions options = context_.options.dmd;
   options.omega_threshold *= window_->stride;
   const size_t seen = sample_count(context_.grid.width, context_.grid.height, context_.step);
-  return qdmd::decompose(samples_, gram_.matrix(samples_, context_.band.team()), options,
-                         static_cast<double>(seen));
+  return qdmd::decompose(samples_, gram_.matrix(samples_), options, static_cast<double>(seen));
 }
 
 // The modes' pictures from filled frames, run by run.
@@ -227,7 +226,7 @@ void WindowSolve::refine_light() {
   if (!clips_) settle_light(&gains_);
 }
 
-// refine_gain() of some frames, by the samples of all members.
+// refine_gain() of some frames.
 void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
                                std::vector<Gain>* gains) {
   std::vector<GainSums> sums(frames.size());
@@ -240,8 +239,6 @@ void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector
                                        context_.end_of_range(0))
                            : GainSums{};
     });
-    if (Team* team = context_.band.team(); team && !sums.empty())
-      team->sum(Talk::light, {sums.front().data(), sums.size() * sums.front().size()});
     for (size_t i = 0; i < frames.size(); ++i)
       if (goes_on[i]) goes_on[i] = refine_gain(sums[i], &gain_of(i), context_.one_gain());
   }

@@ -256,8 +256,8 @@ void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earli
   uint8_t* background[kChannels];
   for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
   std::vector<uint8_t> spread(context_.pixels());
-  median_picture(context_.grid, context_.band, stable_, looks.pictures, context_.room.pool,
-                 background, spread.data(), context_.range());
+  median_picture(context_.grid, stable_, looks.pictures, context_.room.pool, background,
+                 spread.data(), context_.range());
   recall_spread(earlier, &spread);
   blur(spread.data(), reference_.width, reference_.height, context_.room.pool, spread_.data());
   const RobustParameters& parameters = context_.parameters;
@@ -281,9 +281,7 @@ void WindowSolve::recall_spread(const EarlierWindow& earlier, std::vector<uint8_
     for (int col = 0; col < context_.grid.cols; ++col) {
       const auto frames = stable_.of_cell[static_cast<size_t>(row * context_.grid.cols + col)];
       if (frames.size() > 1 || frames.front() != start_frames_) continue;
-      for (int y = std::max(context_.grid.top(row) - context_.band.first(), 0);
-           y < std::min(context_.grid.top(row + 1) - context_.band.first(), context_.band.rows());
-           ++y) {
+      for (int y = context_.grid.top(row); y < context_.grid.top(row + 1); ++y) {
         const ptrdiff_t start = static_cast<ptrdiff_t>(y) * context_.grid.width;
         std::copy(earlier.spread().begin() + start + context_.grid.left(col),
                   earlier.spread().begin() + start + context_.grid.left(col + 1),
