@@ -309,8 +309,8 @@ void Filler<Sample>::take_rows(const SnapshotRange& snapshots, const std::vector
                                                 {spread_.data(), spread_.data() + run_});
         const Samples then = own ? snapshots.samples(next, c) + first : from;
         HWY_DYNAMIC_DISPATCH(take_deep_row)
-        (from.high, from.low, keep, bits_below(snapshots.depth()), padded, map,
-         then.high, then.low, to);
+        (from.high, from.low, keep, bits_below(snapshots.depth()), padded, map, then.high, then.low,
+         to);
       }
     }
   }
