@@ -3,12 +3,13 @@
  * @title: qdmdseparate
  * @short_description: Separates background and foreground of video into several streams at once
  *
- * qdmdseparate does what #qdmdbackground does, with one window and one model for all pictures that
- * are wanted. It has the pads `background`, `foreground`, `mask` and `cutout`, which can be
- * requested and released at any time. Each pad sends one buffer for each frame, with the frame's
- * own timestamps, flags and metadata. The pictures of one frame leave one after the other, so no
- * pad is ahead of another by more than a frame. A pad that is not linked costs nothing; one whose
- * downstream has ended does not stop the others.
+ * qdmdseparate does what #qdmdbackground does, by default with #GstQdmdSeparate:method `robust`. It
+ * has one window and one model for all pictures that are wanted. It has the pads `background`,
+ * `foreground`, `mask` and `cutout`, which can be requested and released at any time. Each pad
+ * sends one buffer for each frame, with the frame's own timestamps, flags and metadata. The
+ * pictures of one frame leave one after the other, so no pad is ahead of another by more than a
+ * frame. A pad that is not linked costs nothing; one whose downstream has ended does not stop the
+ * others.
  *
  * Each pad has caps of its own: the format of the input, or another layout of the same colours,
  * such as RGB as RGBA with a cut-out's transparency, or I420 as NV12. Masks may be GRAY8 beside any

@@ -72,10 +72,11 @@ uint64_t WindowSolve::scratch_bytes(const RobustContext& context, int window_siz
   const auto workers = static_cast<uint64_t>(threads);
   const Grid& grid = context.grid;
   const uint64_t looks = most_looks(context, window_size, models), pixels = context.pixels();
-  const uint64_t start =
-      GridFrames::bytes(grid, static_cast<int>(looks) + 1) +
-      std::max<uint64_t>({light_of_bytes(grid, threads), stable_frames_bytes(grid, looks, threads),
-                          pixels + blur_bytes(grid.width, threads)});
+  // Cells in unit light are written once the light is known.
+  const uint64_t start = std::max(GridFrames::bytes(grid, 1) + light_of_bytes(grid, threads),
+                                  GridFrames::bytes(grid, static_cast<int>(looks) + 1) +
+                                      std::max<uint64_t>(stable_frames_bytes(grid, looks, threads),
+                                                         pixels + blur_bytes(grid.width, threads)));
   const uint64_t masks = workers * mask_scratch_bytes(grid.width, grid.height) +
                          WindowMask::scratch_bytes(pixels, threads);
   const uint64_t filling =
