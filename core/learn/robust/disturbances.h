@@ -10,9 +10,9 @@
 
 namespace qdmd {
 
-// No object changes most of the picture from one frame to the next. Frames from such a change on
-// say nothing of the background: until they show it again, or until the change has lasted for so
-// long that it is the scene.
+// Objects come in steps: few change a tenth of the picture from one frame to the next. Frames from
+// such a change on say nothing of the background: until they show it again, or until the change has
+// lasted for so long that it is the scene.
 class Disturbances {
  public:
   void forget() { *this = {}; }

@@ -195,7 +195,7 @@ QDMD_STEP int64_t kLasts = step("proofs.lasts", int64_t{75});
 QDMD_STEP int64_t kYoungFrames = step("proofs.young_frames", int64_t{200});
 }  // namespace proofs
 
-// ---- Disturbances: what changes most of the picture at once ----
+// ---- Disturbances: what changes a large part of the picture at once ----
 namespace disturbance {
 // Shares of the picture's cells that do not show the background, beyond the most that frames have
 // shown lately: so many more, and so many more than in the frame before, begin a disturbance, and
