@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/passes/agreement.h"
 #include "core/passes/combine.h"
 #include "core/passes/median_network.h"
 #include "core/passes/median_rows.h"
@@ -79,6 +80,45 @@ TEST(MedianRows, IsTheMiddleOfEveryNumberOfRows) {
         for (size_t i = 0; i < count; ++i) sorted.push_back(pointers[i][x] / divisors[i]);
         std::sort(sorted.begin(), sorted.end());
         ASSERT_EQ(median[x], sorted[count / 2]) << count;
+      }
+    }
+  });
+}
+
+// ---- Agreement of cells ----
+
+TEST(Agreement, CountsCellsThatAreAlikeBelowTheEnd) {
+  std::mt19937 rng(211);
+  std::uniform_real_distribution<float> level(0, 255), noise(-6, 6);
+  const float gain[3] = {1.1f, 1, 0.8f}, end = 245, most = 12;
+  on_every_target([&] {
+    for (int width : kWidths) {
+      const auto cells = static_cast<size_t>(width);
+      std::vector<std::unique_ptr<BeforeTheEdge<float>>> planes;
+      for (int i = 0; i < 6; ++i) planes.push_back(std::make_unique<BeforeTheEdge<float>>(cells));
+      const float* const a[3] = {planes[0]->data(), planes[1]->data(), planes[2]->data()};
+      const float* const b[3] = {planes[3]->data(), planes[4]->data(), planes[5]->data()};
+      Agreement slow;
+      for (size_t cell = 0; cell < cells; ++cell) {
+        float apart = 0;
+        bool known = false;
+        for (size_t c = 0; c < 3; ++c) {
+          // A third of the samples are at the end, so that all of a cell's often are.
+          const float shown = rng() % 3 ? level(rng) : 255;
+          (*planes[c + 3])[cell] = shown;
+          (*planes[c])[cell] = std::min(255.0f, gain[c] * shown + noise(rng));
+          if (std::max(a[c][cell], b[c][cell]) >= end) continue;
+          known = true;
+          apart += std::abs(a[c][cell] / gain[c] - b[c][cell]);
+        }
+        slow.seen += known;
+        slow.agree += known && apart < most;
+      }
+      const Agreement fast = find_agreement(a, b, cells, gain, end, most);
+      ASSERT_EQ(fast.seen, slow.seen) << width;
+      ASSERT_EQ(fast.agree, slow.agree) << width;
+      if (cells > 60) {
+        ASSERT_GT(slow.seen, slow.agree) << "nothing to tell apart";
       }
     }
   });

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/learn/robust/learning_steps.h"
+#include "core/passes/agreement.h"
 #include "core/passes/median_rows.h"
 
 namespace qdmd {
@@ -32,24 +33,12 @@ float brightest(const float* const planes[3], size_t cell) {
 // range says too little of.
 float agreement(const float* const frame[3], const float* const reference[3], size_t cells,
                 const Gain& gain) {
-  int agree = 0, seen = 0;
-  // Without branches: the compiler makes vectors of it.
-  for (size_t cell = 0; cell < cells; ++cell) {
-    float difference = 0, known = 0;
-    for (size_t c = 0; c < kChannels; ++c) {
-      const float f = frame[c][cell], r = reference[c][cell];
-      const float says = std::max(f, r) < kAtEnd ? 1.0f : 0.0f;
-      difference += says * std::abs(f / gain[c] - r);
-      known += says;
-    }
-    const int any = known > 0 ? 1 : 0;
-    seen += any;
-    agree += any & (difference < 3 * kAgree ? 1 : 0);
-  }
+  const Agreement found =
+      find_agreement(frame, reference, cells, gain.data(), kAtEnd, kChannels * kAgree);
   // Where all is white, nothing is known.
-  return seen < static_cast<int>(kLeastRatios)
+  return found.seen < kLeastRatios
              ? 1
-             : static_cast<float>(agree) / static_cast<float>(seen);
+             : static_cast<float>(found.agree) / static_cast<float>(found.seen);
 }
 
 // The share of cells with samples at the end of their range.
