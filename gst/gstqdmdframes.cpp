@@ -24,6 +24,9 @@ static void post_status(GstElement* self, const Status& status) {
     case Status::Code::too_much_memory:
       GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("%s", status.message.c_str()), (nullptr));
       break;
+    case Status::Code::bad_folder:
+      GST_ELEMENT_ERROR(self, RESOURCE, OPEN_READ_WRITE, ("%s", status.message.c_str()), (nullptr));
+      break;
     case Status::Code::invalid_options:
       GST_ELEMENT_ERROR(self, LIBRARY, SETTINGS, ("%s", status.message.c_str()), (nullptr));
       break;

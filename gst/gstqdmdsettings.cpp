@@ -154,6 +154,22 @@ const Property kProperties[] = {
      },
      [](Settings& s, const GValue* v) { s.engine.max_memory = g_value_get_uint64(v); },
      [](const Settings& s, GValue* v) { g_value_set_uint64(v, s.engine.max_memory); }},
+    {[](const Settings&) {
+       return g_param_spec_string(
+           "window-on-disk", "Window on disk",
+           "A folder: the frames of the window lie in a file there, which has no name and goes "
+           "when the element stops, and do not count against max-memory (empty: in memory). For "
+           "windows that are larger than the machine's memory",
+           nullptr, kAtStart);
+     },
+     [](Settings& s, const GValue* v) {
+       const gchar* folder = g_value_get_string(v);
+       s.engine.window_on_disk = folder ? folder : "";
+     },
+     [](const Settings& s, GValue* v) {
+       g_value_set_string(
+           v, s.engine.window_on_disk.empty() ? nullptr : s.engine.window_on_disk.c_str());
+     }},
     {[](const Settings& d) {
        return g_param_spec_uint("n-threads", "Number of threads",
                                 "Threads that work on a window (0: one for each core); the "

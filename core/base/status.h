@@ -13,7 +13,8 @@ struct Status {
     too_much_memory,     // what is asked for needs more than max_memory
     not_configured,      // push or drain before configure
     frames_are_waiting,  // push while frames are ready: pop them first
-    bad_file             // bytes that are nothing that was saved
+    bad_file,            // bytes that are nothing that was saved
+    bad_folder           // no file can be made there, or none so large
   };
   Code code = Code::ok;
   std::string message;

@@ -19,8 +19,14 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   // What processes add up has one order.
   workers_ = std::make_unique<Workers>(options.threads, !options.add);
   const uint64_t beside = layout.bytes - layout.store_bytes;
-  frames_ =
-      FrameStore(layout.capacity, width, height, learner->contents(), options.max_memory - beside);
+  PageFile file;
+  if (!options.window_on_disk.empty())
+    if (Status status = file.take(options.window_on_disk, layout.frame_bytes); !status.ok()) {
+      close();
+      return status;
+    }
+  frames_ = FrameStore(layout.capacity, width, height, learner->contents(),
+                       options.max_memory - beside, std::move(file));
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan_.live().hop_size() : options.window_size);
   background_ = std::make_unique<Background>(

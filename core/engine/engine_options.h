@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "core/align/stabilizer.h"
 #include "core/base/levels.h"
@@ -25,7 +26,8 @@ struct EngineOptions : LearnOptions, PictureWishes {
   DecisionSteps steps;                      // of masks
   Stabilize stabilize = Stabilize::off;     // how the camera may move
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
-  int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
+  std::string window_on_disk;  // a folder, where the window's frames lie in a file; "": in memory
+  int threads = 0;             // up to kMaxThreads; 0: all cores. Changes no result
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;

@@ -160,8 +160,9 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
     layout.capacity += options_.window_size;
   const FrameContents contents = learner_->contents();
   const ChromaShape shape = {width_, height_, contents.chroma_columns, contents.chroma_rows};
-  layout.frame_bytes = PlaneSlots::bytes(layout.capacity, shape, options_.depth);
+  layout.frame_bytes = FrameStore::plane_bytes(layout.capacity, width_, height_, contents);
   layout.store_bytes = FrameStore::bytes(layout.capacity, width_, height_, contents);
+  if (!options_.window_on_disk.empty()) layout.store_bytes -= layout.frame_bytes;
   if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width_, height_);
   const uint64_t masks =
       Decision::bytes(width_, height_) + layout.soft_bytes + room_for_planes(shape, options_.depth);
@@ -206,7 +207,8 @@ Status EnginePlan::check_memory() const {
   return {
       Status::Code::too_much_memory,
       "A window-size of " + window + " needs " + std::to_string(layout_.bytes) + " bytes (" +
-          std::to_string(layout_.frame_bytes) + " for its frames" +
+          (options_.window_on_disk.empty() ? std::to_string(layout_.frame_bytes) + " for its frames"
+                                           : "without its frames, which are on disk") +
           (few_pixels ? ", " + std::to_string(any_size) + " to decompose so many frames of any size"
                       : "") +
           ") and max-memory allows " + std::to_string(options_.max_memory) +

@@ -18,8 +18,8 @@ struct EngineLayout {
   int late_frames = 0;  // frames that arrive while a window is solved and is still needed
   int capacity = 0;     // frames that are kept
   int sample_step = 1;
-  uint64_t frame_bytes = 0;  // of the planes of the frames that are kept
-  uint64_t store_bytes = 0;  // of these and of all that belongs to a frame
+  uint64_t frame_bytes = 0;  // of the planes of the frames that are kept, in memory or on disk
+  uint64_t store_bytes = 0;  // of these, if in memory, and of all that belongs to a frame
   uint64_t soft_bytes = 0;   // of soft masks
   uint64_t bytes = 0;        // of these and of all else that is taken, at most at once
 };

@@ -51,14 +51,14 @@ void take_rows(const uint8_t* from, const Spacing& at, SampleBits bits, int firs
 }  // namespace
 
 FrameStore::FrameStore(int capacity, int width, int height, const FrameContents& contents,
-                       uint64_t most_bytes)
+                       uint64_t most_bytes, PageFile file)
     : width_(width),
       height_(height),
       sample_step_(contents.sample_step),
       first_sample_(contents.first_sample),
       most_bytes_(most_bytes),
       rgb_(contents.rgb),
-      planes_(capacity, shape_of(width, height_, contents), contents.depth),
+      planes_(capacity, shape_of(width, height_, contents), contents.depth, std::move(file)),
       spread_(spread_size(width, contents)),
       constant_alpha_(static_cast<size_t>(sample_bytes(contents.depth) * capacity), 255),
       varies_(static_cast<size_t>(capacity), 0),
@@ -71,8 +71,13 @@ FrameStore::FrameStore(int capacity, int width, int height, const FrameContents&
   }
 }
 
+uint64_t FrameStore::plane_bytes(int capacity, int width, int height,
+                                 const FrameContents& contents) {
+  return PlaneSlots::bytes(capacity, shape_of(width, height, contents), contents.depth);
+}
+
 uint64_t FrameStore::bytes(int capacity, int width, int height, const FrameContents& contents) {
-  uint64_t bytes = PlaneSlots::bytes(capacity, shape_of(width, height, contents), contents.depth);
+  uint64_t bytes = plane_bytes(capacity, width, height, contents);
   const auto of_alpha = static_cast<size_t>(sample_bytes(contents.depth));
   uint64_t beside = (of_alpha + 1 + sizeof(Pose)) * static_cast<uint64_t>(capacity) +
                     spread_size(width, contents);

@@ -32,13 +32,15 @@ class FrameStore {
  public:
   FrameStore() = default;
   // Takes all memory but that for alpha that varies, which append() may take once, `most_bytes` in
-  // all at most. Throws std::bad_alloc.
+  // all at most. file: of plane_bytes(), where the planes lie then; or nothing. Throws
+  // std::bad_alloc.
   FrameStore(int capacity, int width, int height, const FrameContents& contents,
-             uint64_t most_bytes = UINT64_MAX);
+             uint64_t most_bytes = UINT64_MAX, PageFile file = {});
 
-  // The bytes that such a store takes, without alpha that varies.
+  // The bytes that such a store takes, without alpha that varies; and those of its planes.
   static uint64_t bytes(int capacity, int width, int height, const FrameContents& contents);
-  // The bytes that it has taken.
+  static uint64_t plane_bytes(int capacity, int width, int height, const FrameContents& contents);
+  // The bytes of memory that it has taken.
   uint64_t bytes() const;
   // These, and those of alpha that varies.
   uint64_t bytes_with_alpha() const { return bytes() + (alpha_ ? 0 : alpha_bytes()); }

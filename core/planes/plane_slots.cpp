@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "core/parallel/pool.h"
 
@@ -25,7 +26,7 @@ uint64_t PlaneSlots::bytes(int capacity, size_t pixels, size_t chroma_samples, i
   return bytes;
 }
 
-PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth)
+PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth, PageFile file)
     : capacity_(capacity),
       depth_(depth),
       pixels_(pixels),
@@ -33,11 +34,13 @@ PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int d
       chroma_samples_(chroma_samples),
       chroma_size_(padded(chroma_samples)),
       reserved_(bytes(capacity, pixels, chroma_samples, depth)),
-      data_(static_cast<uint8_t*>(take_large(reserved_)), GiveBackLarge{reserved_}) {}
+      memory_(file.data() ? nullptr : static_cast<uint8_t*>(take_large(reserved_)),
+              GiveBackLarge{reserved_}),
+      file_(std::move(file)) {}
 
 void PlaneSlots::take_pages(int slot, Pool* pool) {
   const uint64_t end = offset(slot + 1, 0);
-  if (!pool || end <= taken_ || reserved_ < kLargePage) return;
+  if (!pool || file_.data() || end <= taken_ || reserved_ < kLargePage) return;
   // As many for each thread, of machines with few.
   const uint64_t together = std::min<uint64_t>(pool->threads(), 4);
   const uint64_t needed = (end - taken_ + kLargePage - 1) / kLargePage;
@@ -45,7 +48,7 @@ void PlaneSlots::take_pages(int slot, Pool* pool) {
   pool->run(static_cast<size_t>(pages), [&](size_t page) {
     const uint64_t first = taken_ + page * kLargePage;
     if (first < reserved_)
-      qdmd::take_pages(data_.get() + first, std::min<uint64_t>(kLargePage, reserved_ - first));
+      qdmd::take_pages(memory_.get() + first, std::min<uint64_t>(kLargePage, reserved_ - first));
   });
   taken_ = std::min(taken_ + pages * kLargePage, reserved_);
 }

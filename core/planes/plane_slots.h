@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "core/base/large_vector.h"
+#include "core/base/page_file.h"
 #include "core/planes/kept_picture.h"
 
 namespace qdmd {
@@ -22,10 +24,11 @@ class PlaneSlots {
   // Throws std::bad_alloc. The pages are touched slot by slot, so a short stream in a long window
   // costs only what it fills.
   PlaneSlots(int capacity, size_t pixels, int depth = 8)
-      : PlaneSlots(capacity, pixels, pixels, depth) {}
-  // Where the shape says so, channels 1 and 2 have their shared samples only.
-  PlaneSlots(int capacity, const ChromaShape& shape, int depth = 8)
-      : PlaneSlots(capacity, shape.pixels(), shape.samples(), depth) {
+      : PlaneSlots(capacity, pixels, pixels, depth, {}) {}
+  // Where the shape says so, channels 1 and 2 have their shared samples only. file: has bytes() of
+  // the same, and becomes their place; or nothing.
+  PlaneSlots(int capacity, const ChromaShape& shape, int depth = 8, PageFile file = {})
+      : PlaneSlots(capacity, shape.pixels(), shape.samples(), depth, std::move(file)) {
     if (shape.is_shared()) shape_ = shape;
   }
 
@@ -36,7 +39,8 @@ class PlaneSlots {
   static uint64_t bytes(int capacity, const ChromaShape& shape, int depth = 8) {
     return bytes(capacity, shape.pixels(), shape.samples(), depth);
   }
-  uint64_t bytes() const { return reserved_; }
+  // Of memory: none where they lie in a file.
+  uint64_t bytes() const { return file_.data() ? 0 : reserved_; }
 
   int capacity() const { return capacity_; }
   int depth() const { return depth_; }
@@ -46,8 +50,8 @@ class PlaneSlots {
   const ChromaShape& shape() const { return shape_; }
 
   // The highest eight bits of a channel, and all bits.
-  const uint8_t* plane(int slot, int channel) const { return data_.get() + offset(slot, channel); }
-  uint8_t* plane(int slot, int channel) { return data_.get() + offset(slot, channel); }
+  const uint8_t* plane(int slot, int channel) const { return data() + offset(slot, channel); }
+  uint8_t* plane(int slot, int channel) { return data() + offset(slot, channel); }
   Samples samples(int slot, int channel) const {
     return samples_in(plane(slot, channel), digit_size(), depth_);
   }
@@ -70,8 +74,9 @@ class PlaneSlots {
   void resize(size_t pixels);
 
  private:
-  PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth);
+  PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth, PageFile file);
   static uint64_t bytes(int capacity, size_t pixels, size_t chroma_samples, int depth);
+  uint8_t* data() const { return file_.data() ? file_.data() : memory_.get(); }
   // The bytes of a slot's planes of the highest eight bits.
   size_t digit_size() const { return plane_size_ + 2 * chroma_size_; }
   size_t offset(int slot, int channel) const {
@@ -83,7 +88,8 @@ class PlaneSlots {
   size_t pixels_ = 0, plane_size_ = 0, chroma_samples_ = 0, chroma_size_ = 0;
   ChromaShape shape_;
   uint64_t reserved_ = 0, taken_ = 0;
-  std::unique_ptr<uint8_t[], GiveBackLarge> data_;
+  std::unique_ptr<uint8_t[], GiveBackLarge> memory_;
+  PageFile file_;
 };
 
 }  // namespace qdmd

@@ -1,4 +1,5 @@
 #include "examples/archive/rows.h"
+#include "examples/archive/gst_pointers.h"
 
 #include <mpi.h>
 
@@ -85,11 +86,13 @@ EngineOptions engine_options(const JobOptions& options) {
   gint method = 0, amplitude = 0, solver = 0, estimator = 0;
   guint window = 0, rank = 0, step = 0, threads = 0;
   EngineOptions engine;
+  gchar* folder = nullptr;
   g_object_get(element, "method", &method, "amplitude", &amplitude, "solver", &solver, "estimator",
                &estimator, "window-size", &window, "rank", &rank, "sample-step", &step, "n-threads",
                &threads, "max-memory", &engine.max_memory, "omega-threshold",
-               &engine.dmd.omega_threshold, nullptr);
+               &engine.dmd.omega_threshold, "window-on-disk", &folder, nullptr);
   gst_object_unref(element);
+  if (const CharsPtr own(folder); own) engine.window_on_disk = own.get();
   engine.method = static_cast<Method>(method);
   engine.dmd.amplitude = static_cast<Amplitude>(amplitude);
   engine.dmd.solver = static_cast<Solver>(solver);

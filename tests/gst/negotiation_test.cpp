@@ -188,6 +188,22 @@ TEST(Limits, TooLargeAWindowIsAnErrorThatSaysWhatToChange) {
   EXPECT_NE(std::string::npos, text.find(std::to_string(3ull * 200 * 4096 * 2160))) << text;
 }
 
+TEST(Limits, AFolderThatCannotHaveTheWindowIsAnErrorThatSaysWhy) {
+  GQuark domain = 0;
+  int code = 0;
+  const std::string text = first_word(
+      "videotestsrc num-buffers=2 ! video/x-raw,format=RGB,width=64,height=48 ! "
+      "qdmdbackground window-on-disk=/no/such/folder ! fakesink",
+      &domain, &code);
+  EXPECT_EQ(GST_RESOURCE_ERROR, domain);
+  EXPECT_EQ(GST_RESOURCE_ERROR_OPEN_READ_WRITE, code);
+  EXPECT_NE(std::string::npos, text.find("/no/such/folder")) << text;
+  EXPECT_EQ("", first_word("videotestsrc num-buffers=30 ! "
+                           "video/x-raw,format=RGB,width=64,height=48 ! qdmdbackground "
+                           "window-size=8 window-on-disk=/tmp max-memory=2000000 ! fakesink",
+                           &domain, &code));
+}
+
 // What an element says whose sink pad is given caps by hand.
 std::string said_of_caps(const std::string& launch, const std::string& text) {
   GstElement* element = gst_parse_launch(launch.c_str(), nullptr);
