@@ -27,6 +27,10 @@ struct EngineOptions : LearnOptions, PictureWishes {
   uint64_t max_memory = uint64_t{4} << 30;  // bytes that the window and its models may take
   int threads = 0;                          // up to kMaxThreads; 0: all cores. Changes no result
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
+  // 1, 2 or 4: all is learnt and decided in a picture that is so many times smaller in each
+  // direction (FrameReducer), and pictures are enlarged (Enlarger). A choice for who wants masks
+  // alone: Reduction::automatic_scale().
+  int mask_scale = 1;
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;
 };

@@ -258,6 +258,7 @@ Options options_of(const py::dict& settings) {
   set("absorb_frames", &options.absorb_frames);
   set("frame_rate", &options.frame_rate);
   set("time_budget", &options.time_budget);
+  set("mask_scale", &options.mask_scale);
   set("n_threads", &options.threads);
   set("max_memory", &options.max_memory);
   for (const auto& area : settings["ignore"].cast<std::vector<std::array<int, 4>>>())

@@ -1,0 +1,175 @@
+#include "core/foreground/enlarger.h"
+
+#include <algorithm>
+
+#include "core/passes/bands.h"
+#include "core/passes/chroma.h"
+#include "core/passes/enlarge.h"
+#include "core/passes/residual.h"
+
+namespace qdmd {
+
+Enlarger::Enlarger(const Reduction& size, int depth) : size_(size), depth_(depth) {
+  const auto make = [](size_t bytes) { return std::make_unique_for_overwrite<uint8_t[]>(bytes); };
+  const auto sample = static_cast<size_t>(sample_bytes(depth));
+  for (Memory* const plane : {&residual_, &padded_mask_, &largest_})
+    *plane = make(padded_width() * static_cast<size_t>(size.small_height()));
+  mask_ = make(size.pixels());
+  shaded_ = make(size.pixels());
+  alpha_ = make(sample * size.pixels());
+  frame_ = make(sample * kChannels * size.pixels());
+  level_ = make(sample * kChannels * size.pixels());
+  small_level_ = make(sample * kChannels * size.small_pixels());
+}
+
+uint64_t Enlarger::bytes(const Reduction& size, int depth) {
+  const auto sample = static_cast<uint64_t>(sample_bytes(depth));
+  return (2 + sample * (1 + 2 * kChannels)) * size.pixels() +
+         sample * kChannels * size.small_pixels() +
+         3 * (static_cast<uint64_t>(size.small_width()) + 2) *
+             static_cast<uint64_t>(size.small_height());
+}
+
+void Enlarger::enlarge(OutputTask* task, Pool* pool) {
+  // Pixels that one pixel stands for may be to both sides of an area's edge.
+  const auto without_ignored = [this](uint8_t* mask) {
+    ignored_.clear_rows(0, size_.height, size_.width, mask);
+    return mask;
+  };
+  if (task->mask) {
+    if (task->soft) {
+      fade(task->mask, mask_.get(), pool);
+    } else if (task->level[0]) {
+      find_edges(*task, pool);
+      std::fill_n(task->level, kChannels, Samples());
+    } else {
+      repeat(task->mask, mask_.get(), pool);
+    }
+    task->mask = without_ignored(mask_.get());
+  }
+  if (task->shaded) {
+    repeat(task->shaded, shaded_.get(), pool);
+    task->shaded = without_ignored(shaded_.get());
+  }
+  const auto width = static_cast<size_t>(size_.small_width());
+  if (task->alpha)
+    task->alpha =
+        repeat(task->alpha, width, samples_in(alpha_.get(), size_.pixels(), depth_), pool);
+  const Output output = task->output;
+  if (output == Output::background || output == Output::foreground) {
+    if (!task->level[0]) {
+      const MutableSamples small[kChannels] = {plane(small_level_, 0, size_.small_pixels()),
+                                               plane(small_level_, 1, size_.small_pixels()),
+                                               plane(small_level_, 2, size_.small_pixels())};
+      task->model->evaluate_all(size_.small_pixels(), small, pool);
+      std::copy_n(small, kChannels, task->level);
+      task->level_stride = width;
+    }
+    for (size_t c = 0; c < kChannels; ++c)
+      task->level[c] =
+          repeat(task->level[c], task->level_stride, plane(level_, c, size_.pixels()), pool);
+    task->level_stride = static_cast<size_t>(size_.width);
+  }
+  if (output == Output::foreground || output == Output::cutout)
+    for (size_t c = 0; c < kChannels; ++c)
+      task->x[c] = repeat(task->x[c], width, plane(frame_, c, size_.pixels()), pool);
+}
+
+// Of the smaller picture, where a mask has something in a row or next to it.
+bool Enlarger::is_near(const uint8_t* mask, int row) const {
+  const auto width = static_cast<size_t>(size_.small_width());
+  const int first = std::max(row - 1, 0), last = std::min(row + 1, size_.small_height() - 1);
+  return !are_all(mask + static_cast<size_t>(first) * width, 0,
+                  static_cast<size_t>(last - first + 1) * width);
+}
+
+void Enlarger::find_edges(const OutputTask& task, Pool* pool) {
+  for_rows(pool, size_.small_height(), size_.small_pixels(), [&](int first, int rows) {
+    for (int row = first; row < first + rows; ++row)
+      if (is_near(task.mask, row)) cut_residual(task, row);
+  });
+  for_rows(pool, size_.small_height(), size_.pixels(), [&](int first, int rows) {
+    for (int row = first; row < first + rows; ++row) find_edge(task.mask, row);
+  });
+}
+
+// What is outside of the mask differs by nothing.
+void Enlarger::cut_residual(const OutputTask& task, int row) {
+  const auto width = static_cast<size_t>(size_.small_width());
+  const size_t first = static_cast<size_t>(row) * width,
+               of_level = static_cast<size_t>(row) * task.level_stride;
+  const uint8_t *x[kChannels], *level[kChannels];
+  for (int c = 0; c < kChannels; ++c) {
+    x[c] = task.x[c].high + first;
+    level[c] = task.level[c].high + of_level;
+  }
+  uint8_t *const residual = padded(residual_, row), *const mask = padded(padded_mask_, row);
+  residual_norm(x, level, width, residual);
+  apply_mask(residual, task.mask + first, width, residual);
+  std::copy_n(task.mask + first, width, mask);
+  // The border's pixels stand for those outside.
+  for (uint8_t* const samples : {residual, mask}) {
+    samples[-1] = samples[0];
+    samples[width] = samples[width - 1];
+  }
+}
+
+void Enlarger::find_edge(const uint8_t* mask, int row) {
+  const auto width = static_cast<size_t>(size_.width),
+             count = static_cast<size_t>(size_.small_width());
+  const int top = row * size_.scale, end = std::min(top + size_.scale, size_.height);
+  uint8_t* const out = mask_.get() + static_cast<size_t>(top) * width;
+  const uint8_t* const own = mask + static_cast<size_t>(row) * count;
+  if (are_all(own, 0, count)) {
+    std::fill_n(out, static_cast<size_t>(end - top) * width, uint8_t{0});
+    return;
+  }
+  const int above = std::max(row - 1, 0), below = std::min(row + 1, size_.small_height() - 1);
+  const uint8_t* const residual[] = {padded(residual_, above), padded(residual_, row),
+                                     padded(residual_, below)};
+  const uint8_t* const masks[] = {padded(padded_mask_, above), padded(padded_mask_, row),
+                                  padded(padded_mask_, below)};
+  uint8_t* const largest = padded(largest_, row);
+  find_largest(residual, masks, count, largest);
+  for (int phase = 0; phase < end - top; ++phase)
+    edge_row(residual[1], residual[phase < size_.scale / 2 ? 0 : 2], largest, own, count,
+             size_.scale, phase, width, out + static_cast<size_t>(phase) * width);
+}
+
+void Enlarger::fade(const uint8_t* mask, uint8_t* out, Pool* pool) const {
+  const auto width = static_cast<size_t>(size_.width),
+             count = static_cast<size_t>(size_.small_width());
+  for_rows(pool, size_.height, size_.pixels(), [&](int first, int rows) {
+    for (int y = first; y < first + rows; ++y) {
+      const int row = y / size_.scale, phase = y % size_.scale;
+      const int beside =
+          std::clamp(phase < size_.scale / 2 ? row - 1 : row + 1, 0, size_.small_height() - 1);
+      enlarge_row(mask + static_cast<size_t>(row) * count,
+                  mask + static_cast<size_t>(beside) * count, count, size_.scale, phase, width,
+                  out + static_cast<size_t>(y) * width);
+    }
+  });
+}
+
+void Enlarger::repeat(const uint8_t* samples, size_t stride, uint8_t* out, Pool* pool) const {
+  const auto width = static_cast<size_t>(size_.width);
+  for_rows(pool, size_.small_height(), size_.pixels(), [&](int first, int rows) {
+    for (int row = first; row < first + rows; ++row) {
+      const int top = row * size_.scale, end = std::min(top + size_.scale, size_.height);
+      uint8_t* const to = out + static_cast<size_t>(top) * width;
+      repeat_row(samples + static_cast<size_t>(row) * stride, size_.scale, width, to);
+      for (int y = top + 1; y < end; ++y)
+        std::copy_n(to, width, to + static_cast<size_t>(y - top) * width);
+    }
+  });
+}
+
+MutableSamples Enlarger::repeat(Samples samples, size_t stride, MutableSamples out,
+                                Pool* pool) const {
+  repeat(samples.high, stride, out.high, pool);
+  if (!samples.low) return out.high;
+  repeat(samples.low, stride, out.low, pool);
+  return out;
+}
+
+}  // namespace qdmd
