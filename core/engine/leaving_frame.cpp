@@ -222,11 +222,7 @@ void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
     OutputTask task = task_of(Output::mask);
     decide(&task);
     return_to_camera(&task, true);
-    uint8_t* lengths = residual;
-    if (stage_.enlarger) {
-      residual_.resize(frames().window().pixels());
-      lengths = residual_.data();
-    }
+    uint8_t* const lengths = stage_.enlarger ? stage_.enlarger->room() : residual;
     const auto width = static_cast<size_t>(frames().width());
     for (int y = 0; y < frames().height(); ++y) {
       const size_t first = static_cast<size_t>(y) * width;

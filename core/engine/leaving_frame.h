@@ -76,7 +76,6 @@ class LeavingFrame {
   std::unique_ptr<SoftMask> soft_mask_;
   Done done_;
   std::vector<uint8_t> everything_;  // a mask that is set everywhere, once somebody wants a frame
-  std::vector<uint8_t> residual_;    // before it is enlarged
   // The planes. Where pixels share samples, `room_` has those of each pixel.
   PlaneRows planes_;
   std::unique_ptr<uint8_t[]> room_;

@@ -12,7 +12,7 @@ namespace qdmd {
 Enlarger::Enlarger(const Reduction& size, int depth) : size_(size), depth_(depth) {
   const auto make = [](size_t bytes) { return std::make_unique_for_overwrite<uint8_t[]>(bytes); };
   const auto sample = static_cast<size_t>(sample_bytes(depth));
-  for (Memory* const plane : {&residual_, &padded_mask_, &largest_})
+  for (Memory* const plane : {&residual_, &padded_mask_, &means_})
     *plane = make(padded_width() * static_cast<size_t>(size.small_height()));
   mask_ = make(size.pixels());
   shaded_ = make(size.pixels());
@@ -129,11 +129,11 @@ void Enlarger::find_edge(const uint8_t* mask, int row) {
                                      padded(residual_, below)};
   const uint8_t* const masks[] = {padded(padded_mask_, above), padded(padded_mask_, row),
                                   padded(padded_mask_, below)};
-  uint8_t* const largest = padded(largest_, row);
-  find_largest(residual, masks, count, largest);
+  uint8_t* const means = padded(means_, row);
+  find_means(residual, masks, count, means);
   for (int phase = 0; phase < end - top; ++phase)
-    edge_row(residual[1], residual[phase < size_.scale / 2 ? 0 : 2], largest, own, count,
-             size_.scale, phase, width, out + static_cast<size_t>(phase) * width);
+    edge_row(residual[1], residual[phase < size_.scale / 2 ? 0 : 2], means, own, count, size_.scale,
+             phase, width, out + static_cast<size_t>(phase) * width);
 }
 
 void Enlarger::fade(const uint8_t* mask, uint8_t* out, Pool* pool) const {

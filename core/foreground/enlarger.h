@@ -30,6 +30,8 @@ class Enlarger {
   // All that the task's picture is made of becomes as large as the frames. Good until the next
   // call. A hard mask's edge is looked for in the task's x and L, if it has L. pool may be null.
   void enlarge(OutputTask* task, Pool* pool);
+  // Room for a byte for each pixel of the smaller picture, until the next call of enlarge().
+  uint8_t* room() { return small_level_.get(); }
   // out: of the frames' size. The smaller picture's samples.
   void repeat(const uint8_t* samples, uint8_t* out, Pool* pool) const {
     repeat(samples, static_cast<size_t>(size_.small_width()), out, pool);
@@ -53,12 +55,12 @@ class Enlarger {
   int depth_;
   IgnoredAreas ignored_;
   // Residuals in the mask, and the mask, with a sample more at both ends of rows; and what is
-  // largest around each pixel.
+  // means around each pixel.
   size_t padded_width() const { return static_cast<size_t>(size_.small_width()) + 2; }
   uint8_t* padded(const Memory& plane, int row) const {
     return plane.get() + static_cast<size_t>(row) * padded_width() + 1;
   }
-  Memory residual_, padded_mask_, largest_;
+  Memory residual_, padded_mask_, means_;
   Memory mask_, shaded_, alpha_, frame_, level_, small_level_;
 };
 

@@ -77,7 +77,7 @@ HWY_INLINE void enlarge(const uint8_t* row, const uint8_t* beside, size_t count,
 }
 
 template <size_t kScale>
-HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const uint8_t* largest,
+HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
                           const uint8_t* mask, size_t count, int phase, size_t width,
                           uint8_t* out) {
   uint8_t larger[kScale * kPart];
@@ -85,7 +85,7 @@ HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const 
                       [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
                         for (size_t k = 0; k < size; ++k)
                           larger[kScale * k + j] =
-                              sums[k] >= static_cast<uint16_t>(kHalf<kScale> * largest[first + k])
+                              sums[k] >= static_cast<uint16_t>(kHalf<kScale> * means[first + k])
                                   ? mask[first + k]
                                   : 0;
                         if (j + 1 == kScale)
@@ -94,18 +94,28 @@ HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const 
                       });
 }
 
-// A pixel has no edge near if all around it are set.
-void largest_of_nine(const uint8_t* const* residual, const uint8_t* const* mask, size_t count,
-                     uint8_t* HWY_RESTRICT largest) {
-  for (size_t k = 0; k < count; ++k) {
-    uint8_t most = 0, all = 255;
-    for (int r = 0; r < 3; ++r)
-      for (ptrdiff_t x = -1; x <= 1; ++x) {
-        const auto at = static_cast<ptrdiff_t>(k) + x;
-        most = std::max(most, residual[r][at]);
-        all &= mask[r][at];
-      }
-    largest[k] = all ? 0 : most;
+// Residuals are 0 where the mask is.
+void means_of_nine(const uint8_t* const* residual, const uint8_t* const* mask, size_t count,
+                   uint8_t* HWY_RESTRICT means) {
+  const uint8_t *a = residual[0] - 1, *b = residual[1] - 1, *c = residual[2] - 1;
+  const uint8_t *u = mask[0] - 1, *v = mask[1] - 1, *w = mask[2] - 1;
+  uint16_t sums[kPart];
+  uint8_t set[kPart];
+  for (size_t first = 0; first < count; first += kPart) {
+    const size_t size = std::min(kPart, count - first);
+    for (size_t i = 0; i < size; ++i) {
+      const size_t k = first + i;
+      sums[i] = static_cast<uint16_t>(a[k] + a[k + 1] + a[k + 2] + b[k] + b[k + 1] + b[k + 2] +
+                                      c[k] + c[k + 1] + c[k + 2]);
+      // As a byte, 255 is -1: a sum of them is less their number.
+      set[i] = static_cast<uint8_t>(
+          -(u[k] + u[k + 1] + u[k + 2] + v[k] + v[k + 1] + v[k + 2] + w[k] + w[k + 1] + w[k + 2]));
+    }
+    for (size_t i = 0; i < size; ++i) {
+      const float number = set[i] == 0 ? 1.0f : set[i];
+      const auto mean = static_cast<uint8_t>(static_cast<int>(sums[i] / number + 0.5f));
+      means[first + i] = set[i] == 9 ? 0 : mean;
+    }
   }
 }
 
@@ -118,13 +128,13 @@ void enlarge4(const uint8_t* row, const uint8_t* beside, size_t count, int phase
   enlarge<4>(row, beside, count, phase, width, out);
 }
 
-void find_edge2(const uint8_t* residual, const uint8_t* beside, const uint8_t* largest,
+void find_edge2(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
                 const uint8_t* mask, size_t count, int phase, size_t width, uint8_t* out) {
-  find_edge<2>(residual, beside, largest, mask, count, phase, width, out);
+  find_edge<2>(residual, beside, means, mask, count, phase, width, out);
 }
-void find_edge4(const uint8_t* residual, const uint8_t* beside, const uint8_t* largest,
+void find_edge4(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
                 const uint8_t* mask, size_t count, int phase, size_t width, uint8_t* out) {
-  find_edge<4>(residual, beside, largest, mask, count, phase, width, out);
+  find_edge<4>(residual, beside, means, mask, count, phase, width, out);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -140,7 +150,7 @@ HWY_EXPORT(enlarge2);
 HWY_EXPORT(enlarge4);
 HWY_EXPORT(find_edge2);
 HWY_EXPORT(find_edge4);
-HWY_EXPORT(largest_of_nine);
+HWY_EXPORT(means_of_nine);
 
 void repeat_row(const uint8_t* row, int scale, size_t width, uint8_t* out) {
   if (scale == 2)
@@ -157,17 +167,17 @@ void enlarge_row(const uint8_t* row, const uint8_t* beside, size_t count, int sc
     HWY_DYNAMIC_DISPATCH(enlarge4)(row, beside, count, phase, width, out);
 }
 
-void edge_row(const uint8_t* residual, const uint8_t* beside, const uint8_t* largest,
+void edge_row(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
               const uint8_t* mask, size_t count, int scale, int phase, size_t width, uint8_t* out) {
   if (scale == 2)
-    HWY_DYNAMIC_DISPATCH(find_edge2)(residual, beside, largest, mask, count, phase, width, out);
+    HWY_DYNAMIC_DISPATCH(find_edge2)(residual, beside, means, mask, count, phase, width, out);
   else
-    HWY_DYNAMIC_DISPATCH(find_edge4)(residual, beside, largest, mask, count, phase, width, out);
+    HWY_DYNAMIC_DISPATCH(find_edge4)(residual, beside, means, mask, count, phase, width, out);
 }
 
-void find_largest(const uint8_t* const residual[3], const uint8_t* const mask[3], size_t count,
-                  uint8_t* largest) {
-  HWY_DYNAMIC_DISPATCH(largest_of_nine)(residual, mask, count, largest);
+void find_means(const uint8_t* const residual[3], const uint8_t* const mask[3], size_t count,
+                uint8_t* means) {
+  HWY_DYNAMIC_DISPATCH(means_of_nine)(residual, mask, count, means);
 }
 
 }  // namespace qdmd

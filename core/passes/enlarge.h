@@ -20,14 +20,14 @@ void enlarge_row(const uint8_t* row, const uint8_t* beside, size_t count, int sc
 
 // Where in a mask's pixel at its edge the edge is: half-way up what the frame differs by around it.
 // residual, beside: as `row` and `beside` of enlarge_row(), of lengths that are 0 outside of the
-// mask. largest[p]: of pixel p, the largest length around it, or 0 if no edge is near. mask: 255 or
-// 0, of `count` pixels. out[p] = mask[p / scale] where the length there is at least half of
-// largest[p / scale], else 0.
-void edge_row(const uint8_t* residual, const uint8_t* beside, const uint8_t* largest,
+// mask. means: see find_means(). mask: 255 or 0, of `count` pixels. out[p] = mask[p / scale] where
+// the length there is at least half of means[p / scale], else 0.
+void edge_row(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
               const uint8_t* mask, size_t count, int scale, int phase, size_t width, uint8_t* out);
-// largest[p] for pixels of the middle one of three rows, from those with one sample more on both
-// sides; residual[i] and mask[i] are at pixel 0.
-void find_largest(const uint8_t* const residual[3], const uint8_t* const mask[3], size_t count,
-                  uint8_t* largest);
+// means[p] = of pixel p of the middle one of three rows and the eight around it, the mean of the
+// lengths where the mask is set, rounded; 0 where it is set at all nine, or at none: no edge is
+// near then. Rows have one sample more on both sides: residual[i] and mask[i] are at pixel 0.
+void find_means(const uint8_t* const residual[3], const uint8_t* const mask[3], size_t count,
+                uint8_t* means);
 
 }  // namespace qdmd
