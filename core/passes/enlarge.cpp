@@ -59,7 +59,10 @@ HWY_INLINE void interpolate(const uint8_t* HWY_RESTRICT row, const uint8_t* HWY_
 }
 
 template <size_t kScale>
-constexpr uint16_t kHalf = 2 * kScale* kScale;
+constexpr auto kHalf = static_cast<uint16_t>(2 * kScale * kScale);
+// 9/16 of what is added up.
+template <size_t kScale>
+constexpr auto kEdge = static_cast<uint16_t>(9 * kScale * kScale / 4);
 
 template <size_t kScale>
 HWY_INLINE void enlarge(const uint8_t* row, const uint8_t* beside, size_t count, int phase,
@@ -85,7 +88,7 @@ HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const 
                       [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
                         for (size_t k = 0; k < size; ++k)
                           larger[kScale * k + j] =
-                              sums[k] >= static_cast<uint16_t>(kHalf<kScale> * means[first + k])
+                              sums[k] >= static_cast<uint16_t>(kEdge<kScale> * means[first + k])
                                   ? mask[first + k]
                                   : 0;
                         if (j + 1 == kScale)

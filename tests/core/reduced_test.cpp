@@ -142,7 +142,7 @@ Plane with_edges(const Plane& mask, Plane residual, int scale, int width, int he
         white += mask.near(col + i % 3 - 1, row + i / 3 - 1) != 0;
       }
       const bool kept =
-          between(residual, scale, x, y) >= 2 * scale * scale * mean_at_edge(sum, white);
+          16 * between(residual, scale, x, y) >= 9 * 4 * scale * scale * mean_at_edge(sum, white);
       out.samples.push_back(kept ? mask.at(col, row) : 0);
     }
   return out;
@@ -187,8 +187,8 @@ TEST(Reduced, RowsAreEnlarged) {
             edge_row(own->data(), beside, means->data(), white->data(), size, scale, phase,
                      out.size(), out.data());
             for (int x = 0; x < width; ++x) {
-              const bool high = between(plane, scale, x, scale + phase) >=
-                                2 * scale * scale * plane.at(x / scale, 2);
+              const bool high = 16 * between(plane, scale, x, scale + phase) >=
+                                9 * 4 * scale * scale * plane.at(x / scale, 2);
               ASSERT_EQ(out[static_cast<size_t>(x)], high ? mask.at(x / scale, 1) : 0)
                   << x << " of " << width << ", phase " << phase;
             }
