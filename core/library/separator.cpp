@@ -219,8 +219,8 @@ struct Separator::State {
 
   // What was loaded before the first frame belongs to frames like these.
   void check_loaded(const Kind& wanted, int scale) {
-    const Reduction size = {wanted.width, wanted.height, scale};
-    if (loaded->width == size.small_width() && loaded->height == size.small_height() &&
+    const Reduction its = {wanted.width, wanted.height, scale};
+    if (loaded->width == its.small_width() && loaded->height == its.small_height() &&
         loaded->colours == wanted.colours)
       return;
     const std::string size = std::to_string(loaded->width) + "x" + std::to_string(loaded->height);
