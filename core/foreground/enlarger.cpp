@@ -75,18 +75,36 @@ void Enlarger::enlarge(OutputTask* task, Pool* pool) {
       task->x[c] = repeat(task->x[c], width, plane(frame_, c, size_.pixels()), pool);
 }
 
-// Of the smaller picture, where a mask has something in a row or next to it.
-bool Enlarger::is_near(const uint8_t* mask, int row) const {
+// Columns that are looked at together: most of a mask is black.
+struct Enlarger::Block {
+  size_t left, count;
+};
+
+template <typename Visit>
+void Enlarger::for_blocks(Visit visit) const {
+  constexpr size_t kColumns = 128;
   const auto width = static_cast<size_t>(size_.small_width());
-  const int first = std::max(row - 1, 0), last = std::min(row + 1, size_.small_height() - 1);
-  return !are_all(mask + static_cast<size_t>(first) * width, 0,
-                  static_cast<size_t>(last - first + 1) * width);
+  for (size_t left = 0; left < width; left += kColumns)
+    visit(Block{left, std::min(kColumns, width - left)});
+}
+
+// True where the mask has something in the block or next to it.
+bool Enlarger::is_near(const uint8_t* mask, int row, const Block& block) const {
+  const auto width = static_cast<size_t>(size_.small_width());
+  const size_t left = block.left > 0 ? block.left - 1 : 0,
+               right = std::min(block.left + block.count + 1, width);
+  const int last = std::min(row + 1, size_.small_height() - 1);
+  for (int y = std::max(row - 1, 0); y <= last; ++y)
+    if (!are_all(mask + static_cast<size_t>(y) * width + left, 0, right - left)) return true;
+  return false;
 }
 
 void Enlarger::find_edges(const OutputTask& task, Pool* pool) {
   for_rows(pool, size_.small_height(), size_.small_pixels(), [&](int first, int rows) {
     for (int row = first; row < first + rows; ++row)
-      if (is_near(task.mask, row)) cut_residual(task, row);
+      for_blocks([&](const Block& block) {
+        if (is_near(task.mask, row, block)) cut_residual(task, row, block);
+      });
   });
   for_rows(pool, size_.small_height(), size_.pixels(), [&](int first, int rows) {
     for (int row = first; row < first + rows; ++row) find_edge(task.mask, row);
@@ -94,46 +112,52 @@ void Enlarger::find_edges(const OutputTask& task, Pool* pool) {
 }
 
 // What is outside of the mask differs by nothing.
-void Enlarger::cut_residual(const OutputTask& task, int row) {
+void Enlarger::cut_residual(const OutputTask& task, int row, const Block& block) {
   const auto width = static_cast<size_t>(size_.small_width());
-  const size_t first = static_cast<size_t>(row) * width,
-               of_level = static_cast<size_t>(row) * task.level_stride;
+  const size_t first = static_cast<size_t>(row) * width + block.left,
+               of_level = static_cast<size_t>(row) * task.level_stride + block.left;
   const uint8_t *x[kChannels], *level[kChannels];
   for (int c = 0; c < kChannels; ++c) {
     x[c] = task.x[c].high + first;
     level[c] = task.level[c].high + of_level;
   }
-  uint8_t *const residual = padded(residual_, row), *const mask = padded(padded_mask_, row);
-  residual_norm(x, level, width, residual);
-  apply_mask(residual, task.mask + first, width, residual);
-  std::copy_n(task.mask + first, width, mask);
+  uint8_t* const planes[] = {padded(residual_, row), padded(padded_mask_, row)};
+  uint8_t* const residual = planes[0] + block.left;
+  residual_norm(x, level, block.count, residual);
+  apply_mask(residual, task.mask + first, block.count, residual);
+  std::copy_n(task.mask + first, block.count, planes[1] + block.left);
   // The border's pixels stand for those outside.
-  for (uint8_t* const samples : {residual, mask}) {
-    samples[-1] = samples[0];
-    samples[width] = samples[width - 1];
+  for (uint8_t* const samples : planes) {
+    if (block.left == 0) samples[-1] = samples[0];
+    if (block.left + block.count == width) samples[width] = samples[width - 1];
   }
 }
 
 void Enlarger::find_edge(const uint8_t* mask, int row) {
-  const auto width = static_cast<size_t>(size_.width),
-             count = static_cast<size_t>(size_.small_width());
+  const auto scale = static_cast<size_t>(size_.scale), width = static_cast<size_t>(size_.width),
+             small_width = static_cast<size_t>(size_.small_width());
   const int top = row * size_.scale, end = std::min(top + size_.scale, size_.height);
-  uint8_t* const out = mask_.get() + static_cast<size_t>(top) * width;
-  const uint8_t* const own = mask + static_cast<size_t>(row) * count;
-  if (are_all(own, 0, count)) {
-    std::fill_n(out, static_cast<size_t>(end - top) * width, uint8_t{0});
-    return;
-  }
-  const int above = std::max(row - 1, 0), below = std::min(row + 1, size_.small_height() - 1);
-  const uint8_t* const residual[] = {padded(residual_, above), padded(residual_, row),
-                                     padded(residual_, below)};
-  const uint8_t* const masks[] = {padded(padded_mask_, above), padded(padded_mask_, row),
-                                  padded(padded_mask_, below)};
-  uint8_t* const means = padded(means_, row);
-  find_means(residual, masks, count, means);
-  for (int phase = 0; phase < end - top; ++phase)
-    edge_row(residual[1], residual[phase < size_.scale / 2 ? 0 : 2], means, own, count, size_.scale,
-             phase, width, out + static_cast<size_t>(phase) * width);
+  const int rows[] = {std::max(row - 1, 0), row, std::min(row + 1, size_.small_height() - 1)};
+  for_blocks([&](const Block& block) {
+    const size_t left = scale * block.left, count = std::min(scale * block.count, width - left);
+    const uint8_t* const own = mask + static_cast<size_t>(row) * small_width + block.left;
+    uint8_t* const out = mask_.get() + static_cast<size_t>(top) * width + left;
+    if (are_all(own, 0, block.count)) {
+      for (int phase = 0; phase < end - top; ++phase)
+        std::fill_n(out + static_cast<size_t>(phase) * width, count, uint8_t{0});
+      return;
+    }
+    const uint8_t *residual[3], *masks[3];
+    for (size_t r = 0; r < 3; ++r) {
+      residual[r] = padded(residual_, rows[r]) + block.left;
+      masks[r] = padded(padded_mask_, rows[r]) + block.left;
+    }
+    uint8_t* const means = padded(means_, row) + block.left;
+    find_means(residual, masks, block.count, means);
+    for (int phase = 0; phase < end - top; ++phase)
+      edge_row(residual[1], residual[phase < size_.scale / 2 ? 0 : 2], means, own, block.count,
+               size_.scale, phase, count, out + static_cast<size_t>(phase) * width);
+  });
 }
 
 void Enlarger::fade(const uint8_t* mask, uint8_t* out, Pool* pool) const {

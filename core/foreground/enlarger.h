@@ -39,9 +39,12 @@ class Enlarger {
 
  private:
   void find_edges(const OutputTask& task, Pool* pool);
-  bool is_near(const uint8_t* mask, int row) const;
+  struct Block;
+  template <typename Visit>
+  void for_blocks(Visit visit) const;
+  bool is_near(const uint8_t* mask, int row, const Block& block) const;
   void find_edge(const uint8_t* mask, int row);
-  void cut_residual(const OutputTask& task, int row);
+  void cut_residual(const OutputTask& task, int row, const Block& block);
   void fade(const uint8_t* mask, uint8_t* out, Pool* pool) const;
   void repeat(const uint8_t* samples, size_t stride, uint8_t* out, Pool* pool) const;
   MutableSamples repeat(Samples samples, size_t stride, MutableSamples out, Pool* pool) const;

@@ -29,8 +29,8 @@ constexpr size_t kPart = 512;
 
 // Calls make(sums, first, size, j) with what lies j steps of kScale to the right of the edge of
 // each of `size` samples, times (2 kScale)^2: a sample and those beside it have their shares. The
-// border's samples stand for those outside.
-template <size_t kScale, typename Make>
+// border's samples stand for those outside, unless rows are padded by one sample on both sides.
+template <size_t kScale, bool kPadded, typename Make>
 HWY_INLINE void interpolate(const uint8_t* HWY_RESTRICT row, const uint8_t* HWY_RESTRICT beside,
                             size_t count, int phase, Make make) {
   // In 2 kScale-ths; 16 bits hold (2 kScale)^2 samples.
@@ -39,15 +39,17 @@ HWY_INLINE void interpolate(const uint8_t* HWY_RESTRICT row, const uint8_t* HWY_
     return static_cast<uint16_t>(std::abs(2 * step + 1 - static_cast<int>(kScale)));
   };
   const auto others = away(phase), own = static_cast<uint16_t>(kAll - others);
-  const auto at = [&](size_t k) {
+  const auto at = [&](ptrdiff_t k) {
     return static_cast<uint16_t>(own * row[k] + others * beside[k]);
   };
   uint16_t between[kPart + 2], sums[kPart];
   for (size_t first = 0; first < count; first += kPart) {
     const size_t size = std::min(kPart, count - first);
-    for (size_t k = 0; k < size; ++k) between[k + 1] = at(first + k);
-    between[0] = at(first > 0 ? first - 1 : 0);
-    between[size + 1] = at(std::min(first + size, count - 1));
+    for (size_t k = 0; k < size; ++k) between[k + 1] = at(static_cast<ptrdiff_t>(first + k));
+    const auto begin = static_cast<ptrdiff_t>(first), end = static_cast<ptrdiff_t>(first + size),
+               last = static_cast<ptrdiff_t>(count) - 1;
+    between[0] = at(kPadded ? begin - 1 : std::max<ptrdiff_t>(begin - 1, 0));
+    between[size + 1] = at(kPadded ? end : std::min(end, last));
     for (size_t j = 0; j < kScale; ++j) {
       const auto outer = away(static_cast<int>(j)), inner = static_cast<uint16_t>(kAll - outer);
       const uint16_t* const neighbours = between + (j < kScale / 2 ? 0 : 2);
@@ -68,15 +70,15 @@ template <size_t kScale>
 HWY_INLINE void enlarge(const uint8_t* row, const uint8_t* beside, size_t count, int phase,
                         size_t width, uint8_t* out) {
   uint8_t larger[kScale * kPart];
-  interpolate<kScale>(row, beside, count, phase,
-                      [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
-                        for (size_t k = 0; k < size; ++k)
-                          larger[kScale * k + j] = static_cast<uint8_t>(
-                              static_cast<uint16_t>(sums[k] + kHalf<kScale>) / (2 * kHalf<kScale>));
-                        if (j + 1 == kScale)
-                          std::copy_n(larger, std::min(kScale * size, width - kScale * first),
-                                      out + kScale * first);
-                      });
+  interpolate<kScale, false>(
+      row, beside, count, phase, [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
+        for (size_t k = 0; k < size; ++k)
+          larger[kScale * k + j] = static_cast<uint8_t>(
+              static_cast<uint16_t>(sums[k] + kHalf<kScale>) / (2 * kHalf<kScale>));
+        if (j + 1 == kScale)
+          std::copy_n(larger, std::min(kScale * size, width - kScale * first),
+                      out + kScale * first);
+      });
 }
 
 template <size_t kScale>
@@ -84,17 +86,17 @@ HWY_INLINE void find_edge(const uint8_t* residual, const uint8_t* beside, const 
                           const uint8_t* mask, size_t count, int phase, size_t width,
                           uint8_t* out) {
   uint8_t larger[kScale * kPart];
-  interpolate<kScale>(residual, beside, count, phase,
-                      [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
-                        for (size_t k = 0; k < size; ++k)
-                          larger[kScale * k + j] =
-                              sums[k] >= static_cast<uint16_t>(kEdge<kScale> * means[first + k])
-                                  ? mask[first + k]
-                                  : 0;
-                        if (j + 1 == kScale)
-                          std::copy_n(larger, std::min(kScale * size, width - kScale * first),
-                                      out + kScale * first);
-                      });
+  interpolate<kScale, true>(
+      residual, beside, count, phase,
+      [&](const uint16_t* sums, size_t first, size_t size, size_t j) {
+        for (size_t k = 0; k < size; ++k)
+          larger[kScale * k + j] =
+              sums[k] >= static_cast<uint16_t>(kEdge<kScale> * means[first + k]) ? mask[first + k]
+                                                                                 : 0;
+        if (j + 1 == kScale)
+          std::copy_n(larger, std::min(kScale * size, width - kScale * first),
+                      out + kScale * first);
+      });
 }
 
 // Residuals are 0 where the mask is.

@@ -20,9 +20,9 @@ void enlarge_row(const uint8_t* row, const uint8_t* beside, size_t count, int sc
 
 // Where in a mask's pixel at its edge the edge is: half-way up what the frame differs by around it.
 // residual, beside: as `row` and `beside` of enlarge_row(), of lengths that are 0 outside of the
-// mask. means: see find_means(). mask: 255 or 0, of `count` pixels. out[p] = mask[p / scale] where
-// the length there is at least 9/16 of means[p / scale], else 0: pixels at the edge make means
-// less.
+// mask; both have one sample more on both sides. means: see find_means(). mask: 255 or 0, of
+// `count` pixels. out[p] = mask[p / scale] where the length there is at least 9/16 of means[p /
+// scale], else 0: pixels at the edge make means less.
 void edge_row(const uint8_t* residual, const uint8_t* beside, const uint8_t* means,
               const uint8_t* mask, size_t count, int scale, int phase, size_t width, uint8_t* out);
 // means[p] = of pixel p of the middle one of three rows and the eight around it, the mean of the

@@ -184,8 +184,16 @@ TEST(Reduced, RowsAreEnlarged) {
               ASSERT_EQ(out[static_cast<size_t>(x)], bilinear(plane, scale, x, scale + phase))
                   << x << " of " << width << ", phase " << phase;
             const auto means = row(plane, 2);
-            edge_row(own->data(), beside, means->data(), white->data(), size, scale, phase,
-                     out.size(), out.data());
+            // With the border's samples, which stand for those outside.
+            const auto padded = [size](const uint8_t* from) {
+              std::vector<uint8_t> all(from, from + size);
+              all.insert(all.begin(), from[0]);
+              all.push_back(from[size - 1]);
+              return all;
+            };
+            const std::vector<uint8_t> its = padded(own->data()), others = padded(beside);
+            edge_row(its.data() + 1, others.data() + 1, means->data(), white->data(), size, scale,
+                     phase, out.size(), out.data());
             for (int x = 0; x < width; ++x) {
               const bool high = 16 * between(plane, scale, x, scale + phase) >=
                                 9 * 4 * scale * scale * plane.at(x / scale, 2);
@@ -237,14 +245,16 @@ TEST(Reduced, ChosenByTheSize) {
   EXPECT_EQ(Reduction::automatic_scale(1 << 24, 1 << 24), 4);
 }
 
-// A street of bars, noise, and a box that goes through it, sharp to a pixel.
+// A street of bars, noise, and boxes that go through it, sharp to a pixel: the second one where
+// masks are looked at in other blocks.
 void paint(int t, PackedPicture* picture) {
   std::minstd_rand random(static_cast<unsigned>(t) + 1);
   for (int y = 0; y < picture->height; ++y)
     for (int x = 0; x < picture->width; ++x) {
       const auto p =
           static_cast<size_t>(y) * static_cast<size_t>(picture->width) + static_cast<size_t>(x);
-      const bool inside = x >= 3 * t && x < 3 * t + 23 && y >= 21 && y < 52;
+      const int left = 3 * t + (x >= 200 ? 200 : 0);
+      const bool inside = x >= left && x < left + 23 && y >= 21 && y < 52;
       for (size_t c = 0; c < 3; ++c) {
         const int ground = 60 + 40 * (x / 16 % 2) + 11 * static_cast<int>(c) + y / 4;
         const int noise = static_cast<int>(random() >> 8) % 5;
@@ -378,6 +388,8 @@ TEST_P(ReducedEngine, IsThatOfSmallFrames) {
 INSTANTIATE_TEST_SUITE_P(Kinds, ReducedEngine,
                          testing::Values(Kind{Mode::batch, Method::robust, 2, 192, 96},
                                          Kind{Mode::live, Method::robust, 2, 193, 97},
+                                         Kind{Mode::live, Method::robust, 2, 601, 67},
+                                         Kind{Mode::batch, Method::robust, 4, 1101, 70},
                                          Kind{Mode::batch, Method::qdmd, 2, 161, 80},
                                          Kind{Mode::live, Method::qdmd, 2, 160, 81},
                                          Kind{Mode::batch, Method::dmd, 4, 195, 98},
