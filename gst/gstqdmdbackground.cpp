@@ -62,6 +62,9 @@ class BackgroundState : public qdmd::State {
   bool wants_masks(const qdmd::Settings& its) const override {
     return its.output == Output::mask || its.output == Output::cutout;
   }
+  bool wants_masks_alone(const qdmd::Settings& its) const override {
+    return its.output == Output::mask;
+  }
   GstFlowReturn make_pictures(GstBuffer* shell, const qdmd::Settings& its,
                               qdmd::OutputPictures* pictures) override {
     GstBuffer* made = nullptr;

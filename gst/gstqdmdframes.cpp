@@ -226,6 +226,17 @@ static void warn_of_areas_outside(State& state, const Settings& settings) {
                       (nullptr));
 }
 
+// Warns once of a picture that has fewer pixels than its size says.
+static void warn_of_scale(State& state, Output output) {
+  if (!state.reduces || output == Output::mask) return;
+  state.reduces = false;
+  GST_ELEMENT_WARNING(
+      state.element, LIBRARY, SETTINGS,
+      ("Only masks were wanted when this video began, so less of each frame is kept: other "
+       "pictures are enlarged. Set mask-scale=1 before you start the element."),
+      (nullptr));
+}
+
 // Sets controlled properties to what they are at the time of `buffer`.
 static void follow_controllers(State& state, GstBuffer* buffer) {
   const GstSegment& segment = *state.segment;
@@ -270,6 +281,7 @@ GstFlowReturn next_pictures(State& state, OutputPictures* pictures) {
   GST_OBJECT_UNLOCK(state.element);
 
   const GstFlowReturn flow = state.make_pictures(shell.get(), settings, pictures);
+  for (const OutputPicture& picture : *pictures) warn_of_scale(state, picture.output);
   if (flow != GST_FLOW_OK) {
     // Nobody wants what is still in the engine.
     drop_frames(state);
@@ -381,6 +393,16 @@ static void warn_of_settings_without_effect(State& state, const Settings& settin
   }
 }
 
+// The scale of masks, where that is for the element to choose: other pictures lose what masks do
+// not.
+static int mask_scale_of(const State& state, const Settings& settings, const GstVideoInfo& info) {
+  if (settings.mask_scale != 0) return settings.mask_scale;
+  const bool pictures = settings.object_messages && settings.object_snapshots;
+  if (pictures || !state.wants_masks_alone(settings)) return 1;
+  const int width = GST_VIDEO_INFO_WIDTH(&info), height = GST_VIDEO_INFO_HEIGHT(&info);
+  return Reduction::automatic_scale(width, height);
+}
+
 bool configure(State& state, const Settings& settings, const GstVideoInfo& info, GstCaps* caps) {
   warn_of_settings_without_effect(state, settings);
   forget_frames(state);
@@ -399,6 +421,13 @@ bool configure(State& state, const Settings& settings, const GstVideoInfo& info,
                            ? double(GST_VIDEO_INFO_FPS_N(&info)) / GST_VIDEO_INFO_FPS_D(&info)
                            : Latency::kAssumedRate;
   const bool configured = with_engine(state, [&](Engine& engine) {
+    options.mask_scale = mask_scale_of(state, settings, info);
+    // What was saved of video in all its pixels goes on so.
+    if (settings.mask_scale == 0 && state.loaded &&
+        state.loaded->learnt.width == GST_VIDEO_INFO_WIDTH(&info) &&
+        state.loaded->learnt.height == GST_VIDEO_INFO_HEIGHT(&info))
+      options.mask_scale = 1;
+    state.reduces = settings.mask_scale == 0 && options.mask_scale > 1;
     state.background.keep(engine);
     state.background.set_caps(info, CapsPtr(gst_caps_ref(caps)));
     Status status =

@@ -128,6 +128,14 @@ class SeparateState : public qdmd::State {
     });
     return wants;
   }
+  bool wants_masks_alone(const qdmd::Settings&) const override {
+    bool mask = false, others = false;
+    each([&](GstQdmdOutlet* outlet) {
+      if (gst_pad_is_linked(GST_PAD(outlet)))
+        (qdmd::output_of(outlet) == Output::mask ? mask : others) = true;
+    });
+    return mask && !others;
+  }
   GstFlowReturn make_pictures(GstBuffer* shell, const qdmd::Settings&,
                               qdmd::OutputPictures* pictures) override {
     for (size_t kind = 0; kind < kCount; ++kind) {

@@ -333,6 +333,15 @@ const Property kProperties[] = {
            1e6, d.motion_end_time, kAnyTime);
      },
      QDMD_DOUBLE(s.motion_end_time)},
+    {[](const Settings& d) {
+       return g_param_spec_uint(
+           "mask-scale", "Scale of masks",
+           "Masks are found in a picture so many times smaller in each direction, and enlarged: 1, "
+           "2 or 4. Other pictures have no more pixels than that, either (0: 1 up to 2.5 million "
+           "pixels, or if anything but masks is sent, else 2, and 4 above 20 million)",
+           0, 4, guint(d.mask_scale), kAtStart);
+     },
+     QDMD_UINT(s.mask_scale)},
 };
 
 }  // namespace

@@ -25,6 +25,7 @@ struct Settings {
   Output output = Output::background;
   bool post_messages = false, regions = false, object_messages = false, object_snapshots = false;
   int regions_min_area = 0;  // pixels
+  int mask_scale = 0;        // EngineOptions::mask_scale; 0: chosen
   // Parts of the picture's height; seconds.
   double object_min_size = ObjectOptions().min_size;
   double object_appear_time = ObjectOptions().appear_seconds;

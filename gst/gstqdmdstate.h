@@ -63,6 +63,8 @@ class State {
   // From the streaming thread, with the stream lock and without the others.
   // Whether somebody is going to ask for masks or cut-outs.
   virtual bool wants_masks(const Settings& settings) const = 0;
+  // Whether nobody is going to ask for anything else, as far as it is known.
+  virtual bool wants_masks_alone(const Settings& settings) const = 0;
   // Adds the pictures that somebody wants of the frame that left `shell`, not drawn yet. Not OK:
   // what waits is dropped.
   virtual GstFlowReturn make_pictures(GstBuffer* shell, const Settings& settings,
@@ -108,6 +110,7 @@ class State {
   bool warned_of_no_room = false;
   bool told_ready = false;    // the newest solve's exposure had settled, and somebody was told
   guint ignored_seen = 0;     // Settings::ignored_set of those that were looked at
+  bool reduces = false;       // mask-scale was chosen, and is above 1
   bool camera_moved = false;  // in the frame that left last
   std::bitset<kMostSettings> warned;  // of settings without effect, a bit for each id
   StreamTime time;                    // of frames that come in

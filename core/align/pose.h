@@ -52,6 +52,11 @@ inline Pose inverse(const Pose& pose) {
   return {-(a * pose.x + b * pose.y), -(-b * pose.x + a * pose.y), -pose.angle, 1 / pose.scale};
 }
 
+// The same of a picture that is so many times as large.
+inline Pose enlarged(const Pose& pose, int scale) {
+  return {scale * pose.x, scale * pose.y, pose.angle, pose.scale};
+}
+
 // First `inner`, then `outer`.
 inline Pose compose(const Pose& outer, const Pose& inner) {
   const double a = outer.scale * std::cos(outer.angle), b = outer.scale * std::sin(outer.angle);

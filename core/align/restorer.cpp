@@ -21,17 +21,8 @@ uint64_t Restorer::bytes(int width, int height, int depth) {
 }
 
 void Restorer::write_canvas(const BackgroundModel& model, size_t pixels, Pool* pool) {
-  const auto write = [&](size_t run) {
-    const size_t first = run * kMaxRun;
-    const MutableSamples out[3] = {samples(canvas_, 0) + first, samples(canvas_, 1) + first,
-                                   samples(canvas_, 2) + first};
-    model.evaluate(first, std::min(kMaxRun, pixels - first), out);
-  };
-  const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
-  if (pool)
-    pool->run(runs, write);
-  else
-    for (size_t run = 0; run < runs; ++run) write(run);
+  const MutableSamples out[3] = {samples(canvas_, 0), samples(canvas_, 1), samples(canvas_, 2)};
+  model.evaluate_all(pixels, out, pool);
 }
 
 void Restorer::restore_level(const Pose& pose, const Samples frame[3], Resampler* resampler,

@@ -11,6 +11,25 @@ bool IgnoredAreas::add(const Rectangle& area) {
   return true;
 }
 
+IgnoredAreas IgnoredAreas::reduced(int scale) const {
+  // Rounded down, below 0 too.
+  const auto divided = [scale](int64_t value) {
+    return value >= 0 ? value / scale : -((scale - 1 - value) / scale);
+  };
+  IgnoredAreas areas = *this;
+  for (size_t i = 0; i < count_; ++i) {
+    const auto side = [&](int first, int length, int* small_first, int* small_length) {
+      const int64_t begin = divided(first), end = divided(int64_t{first} + length - 1) + 1;
+      *small_first = static_cast<int>(begin);
+      *small_length = static_cast<int>(end - begin);
+    };
+    Rectangle& area = areas.areas_[i];
+    side(areas_[i].x, areas_[i].width, &area.x, &area.width);
+    side(areas_[i].y, areas_[i].height, &area.y, &area.height);
+  }
+  return areas;
+}
+
 unsigned IgnoredAreas::outside(int width, int height) const {
   const auto begin = areas_.begin();
   return static_cast<unsigned>(std::count_if(begin, begin + count_, [&](const Rectangle& area) {

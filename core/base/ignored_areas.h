@@ -24,6 +24,10 @@ class IgnoredAreas {
   size_t size() const { return count_; }
   const Rectangle& operator[](size_t i) const { return areas_[i]; }
 
+  // The same in a picture whose pixels stand for scale x scale of these: all that have a part in
+  // some area are ignored.
+  IgnoredAreas reduced(int scale) const;
+
   // How many rectangles have no pixel of a picture of width x height.
   unsigned outside(int width, int height) const;
 

@@ -14,6 +14,9 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   close();
   plan_ = std::move(plan);
   const EngineLayout& layout = plan_.layout();
+  const Reduction& size = plan_.size();
+  // Of what is learnt.
+  const int small_width = size.small_width(), small_height = size.small_height();
   const bool live = options.mode == Mode::live;
   auto learner = plan_.take_learner();
   // What processes add up has one order.
@@ -25,8 +28,12 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       close();
       return status;
     }
-  frames_ = FrameStore(layout.capacity, width, height, learner->contents(),
+  frames_ = FrameStore(layout.capacity, small_width, small_height, learner->contents(),
                        options.max_memory - beside, std::move(file));
+  if (size.is_reduced()) {
+    reducer_ = std::make_unique<FrameReducer>(size, options.depth);
+    enlarger_ = std::make_unique<Enlarger>(size, options.depth);
+  }
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan_.live().hop_size() : options.window_size);
   background_ = std::make_unique<Background>(
@@ -34,18 +41,20 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
       LearnerRoom{&frames_, options.window_size, plan_.models(), &workers_->pool(), &clock_},
       options.colours, at_rate(options.steps, options.frame_rate), options.levels);
   if (options.stabilize != Stabilize::off) {
-    stabilizer_ = std::make_unique<Stabilizer>(options.stabilize, options.colours, width, height);
-    restorer_ = std::make_unique<Restorer>(width, height, options.depth);
+    stabilizer_ =
+        std::make_unique<Stabilizer>(options.stabilize, options.colours, small_width, small_height);
+    restorer_ = std::make_unique<Restorer>(small_width, small_height, options.depth);
   }
-  const Stage stage = {&frames_, background_.get(), workers_.get(), &pace_,
-                       &clock_,  stabilizer_.get(), restorer_.get()};
+  const Stage stage = {&frames_, background_.get(), workers_.get(),  &pace_,
+                       &clock_,  stabilizer_.get(), restorer_.get(), enlarger_.get()};
   if (live)
     schedule_ = std::make_unique<LiveSchedule>(stage, plan_.live());
   else
     schedule_ = std::make_unique<BatchSchedule>(stage, options.window_size, layout.late_frames);
   leaving_ = std::make_unique<LeavingFrame>(stage, schedule_.get(), options.levels,
                                             options.mask_softness > 0);
-  background_->set_wishes(first_wishes(options));
+  wishes_ = first_wishes(options);
+  follow_wishes();
   return {};
 } catch (...) {
   close();
@@ -61,6 +70,8 @@ void Engine::close() {
   background_.reset();
   stabilizer_.reset();
   restorer_.reset();
+  enlarger_.reset();
+  reducer_.reset();
   frames_ = FrameStore();
   plan_ = EnginePlan();
 }
@@ -73,20 +84,25 @@ void Engine::go_on() {
   if (configured() && schedule_->queue().pending == 0) schedule_->go_on();
 }
 
+void Engine::follow_wishes() {
+  if (enlarger_) enlarger_->set_ignored(wishes_.ignored);
+  background_->set_wishes(plan_.wishes_of(wishes_));
+}
+
 Status Engine::push(const ImageView& frame, const Wishes* wishes) {
   if (Status status = check(frame); !status.ok()) return status;
   const Clock::Span span(clock_, Clock::frames);
   return flushed_if_it_throws(this, [&]() -> Status {
     if (wishes) {
-      Wishes taken = background_->wishes();
-      static_cast<LearnWishes&>(taken) = *wishes;
-      taken.ignored = wishes->ignored;
-      background_->set_wishes(taken);
-      workers_->ask_for(taken.threads);
-      pace_.set_budget(taken.time_budget);
+      static_cast<LearnWishes&>(wishes_) = *wishes;
+      wishes_.ignored = wishes->ignored;
+      follow_wishes();
+      workers_->ask_for(wishes_.threads);
+      pace_.set_budget(wishes_.time_budget);
     }
     workers_->follow();
-    if (schedule_->push(frame)) return {};
+    if (schedule_->push(reducer_ ? reducer_->reduce(frame, workers_->idle_pool()) : frame))
+      return {};
     flush();
     return plan_.alpha_refused(frames_.bytes_with_alpha());
   });
@@ -97,7 +113,7 @@ Status Engine::check(const ImageView& frame) const {
   if (!configured()) return {Code::not_configured, "configure the engine before pushing frames"};
   if (schedule_->queue().ready > 0)
     return {Code::frames_are_waiting, "pop the frames that are ready before pushing more"};
-  if (frame.width != frames_.width() || frame.height != frames_.height())
+  if (frame.width != plan_.size().width || frame.height != plan_.size().height)
     return {Code::invalid_options, "configure the engine anew for frames of another size"};
   if (frame.bits.depth != plan_.options().depth)
     return {Code::invalid_options, "configure the engine anew for samples of other depth"};
@@ -112,10 +128,9 @@ Status Engine::check(const ImageView& frame) const {
 LeavingFrame* Engine::next(const Wishes* wishes) {
   if (!configured() || schedule_->queue().ready == 0) return nullptr;
   if (wishes) {
-    Wishes taken = background_->wishes();
-    static_cast<PictureWishes&>(taken) = *wishes;
-    taken.ignored = wishes->ignored;
-    background_->set_wishes(taken);
+    static_cast<PictureWishes&>(wishes_) = *wishes;
+    wishes_.ignored = wishes->ignored;
+    follow_wishes();
   }
   return leaving_.get();
 }
@@ -135,8 +150,9 @@ Status Engine::drain() {
 bool Engine::write_background(const MutableImageView& out) {
   if (!configured() || !background_->known()) return false;
   schedule_->show_newest();
-  write_picture(task_of_background(frames_, background_->model()), plan_.options().levels, out, 0,
-                frames_.height());
+  OutputTask task = task_of_background(frames_, background_->model());
+  if (enlarger_) enlarger_->enlarge(&task, workers_->idle_pool());
+  write_picture(task, plan_.options().levels, out, 0, out.height);
   return true;
 }
 
@@ -179,7 +195,7 @@ EngineReport Engine::report() const {
                  leaving_->soft_bytes();
   if (stabilizer_) {
     report.views = stabilizer_->views();
-    report.newest_pose = stabilizer_->motion();
+    report.newest_pose = enlarged(stabilizer_->motion(), plan_.size().scale);
   }
   return report;
 }

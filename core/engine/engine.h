@@ -8,6 +8,7 @@
 #include "core/engine/leaving_frame.h"
 #include "core/engine/schedule.h"
 #include "core/engine/wishes.h"
+#include "core/frames/frame_reducer.h"
 
 namespace qdmd {
 
@@ -78,9 +79,9 @@ class Engine {
   // that ends early has the frames before it. Batch only.
   void go_on();
 
-  // Writes the newest background. Batch: the background of the last frame of the newest solved
-  // window. Live: of the frame with which the newest model came. While a background is held: that
-  // one. False: there is none yet.
+  // Writes the newest background, in the frames' size. Batch: the background of the last frame of
+  // the newest solved window. Live: of the frame with which the newest model came. While a
+  // background is held: that one. False: there is none yet.
   bool write_background(const MutableImageView& out);
   // Gives all that was learnt about the background that write_background() writes, with its
   // picture; the caller sets its colours. False: nothing is learnt yet. Waits for a solve that is
@@ -101,11 +102,16 @@ class Engine {
 
  private:
   Status check(const ImageView& frame) const;
+  void follow_wishes();
 
   EnginePlan plan_;
+  Wishes wishes_;  // of the frames
   Clock clock_;
   Pace pace_{&clock_};
   FrameStore frames_;
+  // Where masks are found in a smaller picture.
+  std::unique_ptr<FrameReducer> reducer_;
+  std::unique_ptr<Enlarger> enlarger_;
   std::unique_ptr<Stabilizer> stabilizer_;
   std::unique_ptr<Restorer> restorer_;
   std::unique_ptr<Background> background_;

@@ -29,6 +29,10 @@ struct EngineOptions : LearnOptions, PictureWishes {
   std::string window_on_disk;  // a folder, where the window's frames lie in a file; "": in memory
   int threads = 0;             // up to kMaxThreads; 0: all cores. Changes no result
   double frame_rate = 0;  // frames per second at which they come; 0: unknown, or as they are wanted
+  // 1, 2 or 4: all is learnt and decided in a picture that is so many times smaller in each
+  // direction (FrameReducer), and pictures are enlarged (Enlarger). A choice for who wants masks
+  // alone: Reduction::automatic_scale().
+  int mask_scale = 1;
 
   static constexpr int kMinWindow = 2, kMaxWindow = 2048, kMaxThreads = Workers::kMost;
 };

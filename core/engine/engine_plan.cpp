@@ -8,7 +8,9 @@
 
 #include "core/align/restorer.h"
 #include "core/foreground/decision.h"
+#include "core/foreground/enlarger.h"
 #include "core/foreground/soft_mask.h"
+#include "core/frames/frame_reducer.h"
 #include "core/learn/learner.h"
 #include "core/learn/robust/robust_learner.h"
 #include "core/parallel/workers.h"
@@ -65,10 +67,18 @@ std::unique_ptr<Learner> learner_of(const EngineOptions& options, int width, int
   return Learner::make(learnt, width, height);
 }
 
+std::string name_of(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 // "100 frames of 640x480".
-std::string describe(const EngineOptions& options, int width, int height) {
-  return std::to_string(options.window_size) + " frames of " + std::to_string(width) + "x" +
-         std::to_string(height);
+std::string describe(const EngineOptions& options, const Reduction& size) {
+  std::string text =
+      std::to_string(options.window_size) + " frames of " + name_of(size.width, size.height);
+  if (size.is_reduced())
+    text += " (as " + name_of(size.small_width(), size.small_height()) +
+            ", mask-scale=" + std::to_string(size.scale) + ")";
+  return text;
 }
 
 // Of a process that has some rows of pictures.
@@ -85,6 +95,8 @@ Status check_rows(const EngineOptions& options) {
     return {Code::invalid_options,
             "solver=qr and solver=adjoint need all pixels in one process: use gram, gram-extended "
             "or auto"};
+  if (options.mask_scale != 1)
+    return {Code::invalid_options, "processes share a picture's rows with mask-scale=1 only"};
   if (options.first_row < 0 || options.first_row % options.chroma_rows != 0)
     return {Code::invalid_options, "pixels that share a sample belong to one process"};
   return {};
@@ -109,6 +121,8 @@ Status check_options(const EngineOptions& options, int width, int height) {
             "rank, omega-threshold and foreground-threshold must not be negative"};
   if (options.mask_softness < 0 || options.mask_softness > kMostSoftness)
     return {Code::invalid_options, "mask-softness must be 0 (hard) to 15 pixels"};
+  if (!Reduction::is_scale(options.mask_scale))
+    return {Code::invalid_options, "mask-scale must be 0 (chosen), 1, 2 or 4"};
   if (options.depth < 8 || options.depth > EngineOptions::kMostDepth)
     return {Code::invalid_options, "a sample has 8 to 16 bits"};
   if (options.chroma_columns < 1 || options.chroma_columns > 2 || options.chroma_rows < 1 ||
@@ -125,15 +139,17 @@ Status check_options(const EngineOptions& options, int width, int height) {
 }  // namespace
 
 EnginePlan::EnginePlan(const EngineOptions& options, int width, int height)
-    : options_(options), width_(width), height_(height) {
+    : options_(options), size_{width, height, 1} {
   status_ = check_options(options, width, height);
   if (!status_.ok()) return;
+  size_.scale = options.mask_scale;
   if (has_too_many_pixels(width, height)) {
     layout_.bytes = UINT64_MAX;
   } else {
-    learner_ = learner_of(options, width, height);
+    const int small_width = size_.small_width(), small_height = size_.small_height();
+    learner_ = learner_of(options, small_width, small_height);
     const bool live = options.mode == Mode::live;
-    if (live) live_ = plan_of(options, *learner_, width, height);
+    if (live) live_ = plan_of(options, *learner_, small_width, small_height);
     int late = 0;
     if (live)
       late = live_.most_late_frames();
@@ -150,6 +166,7 @@ EnginePlan::EnginePlan(const EngineOptions& options, int width, int height)
 
 EngineLayout EnginePlan::layout_with(int late_frames) const {
   const bool live = options_.mode == Mode::live;
+  const int width = size_.small_width(), height = size_.small_height();
   EngineLayout layout;
   layout.late_frames = late_frames;
   layout.delay = live ? 0 : options_.window_size - 1 + late_frames;
@@ -159,19 +176,22 @@ EngineLayout EnginePlan::layout_with(int late_frames) const {
   if (!live && learner_->may_read_frames(options_.window_size))
     layout.capacity += options_.window_size;
   const FrameContents contents = learner_->contents();
-  const ChromaShape shape = {width_, height_, contents.chroma_columns, contents.chroma_rows};
-  layout.frame_bytes = FrameStore::plane_bytes(layout.capacity, width_, height_, contents);
-  layout.store_bytes = FrameStore::bytes(layout.capacity, width_, height_, contents);
+  const ChromaShape shape = {width, height, contents.chroma_columns, contents.chroma_rows};
+  layout.frame_bytes = FrameStore::plane_bytes(layout.capacity, width, height, contents);
+  layout.store_bytes = FrameStore::bytes(layout.capacity, width, height, contents);
   if (!options_.window_on_disk.empty()) layout.store_bytes -= layout.frame_bytes;
-  if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width_, height_);
+  if (options_.mask_softness > 0) layout.soft_bytes = SoftMask::bytes(width, height);
   const uint64_t masks =
-      Decision::bytes(width_, height_) + layout.soft_bytes + room_for_planes(shape, options_.depth);
+      Decision::bytes(width, height) + layout.soft_bytes + room_for_planes(shape, options_.depth);
   const uint64_t camera =
       options_.stabilize == Stabilize::off
           ? 0
-          : Stabilizer::bytes(width_, height_) + Restorer::bytes(width_, height_, options_.depth);
+          : Stabilizer::bytes(width, height) + Restorer::bytes(width, height, options_.depth);
+  const uint64_t sizes = size_.is_reduced() ? FrameReducer::bytes(size_, options_.depth) +
+                                                  Enlarger::bytes(size_, options_.depth)
+                                            : 0;
   layout.bytes = saturating_sum(
-      saturating_sum(layout.store_bytes, masks + camera),
+      saturating_sum(layout.store_bytes, masks + camera + sizes),
       learner_->bytes(options_.window_size, layout.capacity, models_of(options_.mode, late_frames),
                       Workers::count(options_.threads)));
   return layout;
@@ -187,7 +207,7 @@ uint64_t EnginePlan::bytes_of_any_size() const {
 }
 
 Status EnginePlan::check_memory() const {
-  const std::string window = describe(options_, width_, height_);
+  const std::string window = describe(options_, size_);
   if (layout_.bytes == UINT64_MAX)
     return {Status::Code::too_much_memory,
             "A window-size of " + window +
@@ -219,20 +239,30 @@ Status EnginePlan::check_memory() const {
 Status EnginePlan::alpha_refused(uint64_t store_bytes) const {
   return {
       Status::Code::too_much_memory,
-      "A window-size of " + describe(options_, width_, height_) + " whose alpha varies needs " +
+      "A window-size of " + describe(options_, size_) + " whose alpha varies needs " +
           std::to_string(layout_.bytes - layout_.store_bytes + store_bytes) +
           " bytes and max-memory allows " + std::to_string(options_.max_memory) +
           ": lower window-size, scale the video down, take the alpha out, or raise max-memory."};
 }
 
+Wishes EnginePlan::wishes_of(Wishes wishes) const {
+  if (!size_.is_reduced()) return wishes;
+  wishes.ignored = wishes.ignored.reduced(size_.scale);
+  wishes.mask_softness = (wishes.mask_softness + size_.scale - 1) / size_.scale;
+  return wishes;
+}
+
 Status EnginePlan::may_learn_from(const Learnt& learnt) const {
-  if (learnt.width != width_ || learnt.height != height_)
-    return {Status::Code::invalid_options,
-            "it is the background of " + std::to_string(learnt.width) + "x" +
-                std::to_string(learnt.height) + " video and this video is " +
-                std::to_string(width_) + "x" + std::to_string(height_) +
-                ": scale the video, or save the background of video of this size."};
-  return {};
+  const int width = size_.small_width(), height = size_.small_height();
+  if (learnt.width == width && learnt.height == height) return {};
+  const std::string its = name_of(learnt.width, learnt.height);
+  std::string text = "it is the background of " + its + " video and this video is " +
+                     name_of(size_.width, size_.height);
+  if (size_.is_reduced())
+    text += ", learnt as " + name_of(width, height) + ": set mask-scale to what it was";
+  else
+    text += ": scale the video";
+  return {Status::Code::invalid_options, text + ", or save the background of video of this size."};
 }
 
 }  // namespace qdmd

@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/reduction.h"
 #include "core/base/status.h"
 #include "core/engine/engine_options.h"
 #include "core/engine/live_plan.h"
@@ -33,8 +34,8 @@ class EnginePlan {
   // Not ok: no engine can be configured so, and what is said below holds as far as it is known.
   const Status& status() const { return status_; }
   const EngineOptions& options() const { return options_; }
-  int width() const { return width_; }
-  int height() const { return height_; }
+  // Of the frames, and of the picture that is learnt.
+  const Reduction& size() const { return size_; }
   // Bytes are UINT64_MAX, and the rest is nothing, where there are too many pixels.
   const EngineLayout& layout() const { return layout_; }
   Models models() const { return models_; }
@@ -42,6 +43,8 @@ class EnginePlan {
   const LivePlan& live() const { return live_; }
   // The learner, whose first caller gets it.
   std::unique_ptr<Learner> take_learner() { return std::move(learner_); }
+  // What is wished of the frames, for the picture that is learnt.
+  Wishes wishes_of(Wishes wishes) const;
 
   // Ok if frames of this size may have that background.
   Status may_learn_from(const Learnt& learnt) const;
@@ -55,7 +58,7 @@ class EnginePlan {
   EngineLayout layout_with(int late_frames) const;
 
   EngineOptions options_;
-  int width_ = 0, height_ = 0;
+  Reduction size_;
   Status status_;
   std::unique_ptr<Learner> learner_;
   LivePlan live_;

@@ -18,6 +18,17 @@ OutputTask task_of_background(const FrameStore& frames, const BackgroundModel& m
   return task;
 }
 
+namespace {
+
+void enlarge(const Reduction& size, UncoveredPlace* place) {
+  place->x *= size.scale;
+  place->y *= size.scale;
+  place->width = std::min(size.scale * place->width, size.width - place->x);
+  place->height = std::min(size.scale * place->height, size.height - place->y);
+}
+
+}  // namespace
+
 LeavingFrame::LeavingFrame(const Stage& stage, Schedule* schedule, const Levels& levels, bool soft)
     : stage_(stage), schedule_(schedule), levels_(levels) {
   // Pages are touched once somebody wants more than the background.
@@ -36,14 +47,26 @@ uint64_t LeavingFrame::soft_bytes() const {
   return soft_mask_ ? SoftMask::bytes(frames().width(), frames().height()) : 0;
 }
 
-Pose LeavingFrame::pose() const { return frames().pose(slot()); }
+// In pixels of what is learnt.
+Pose LeavingFrame::camera() const { return frames().pose(slot()); }
+
+Pose LeavingFrame::pose() const {
+  return stage_.enlarger ? enlarged(camera(), stage_.enlarger->size().scale) : camera();
+}
 
 bool LeavingFrame::next_uncovered(UncoveredPlace* place) {
   meet();
   UncoveredPlaces* const places = stage_.background->learner().uncovered();
   const int64_t number =
       static_cast<int64_t>(frames().frames_taken()) - frames().size() + schedule_->next_index();
-  return places && places->take(number, place);
+  if (!places || !places->take(number, place)) return false;
+  if (stage_.enlarger) qdmd::enlarge(stage_.enlarger->size(), place);
+  return true;
+}
+
+// Of the frame.
+size_t LeavingFrame::pixels() const {
+  return stage_.enlarger ? stage_.enlarger->size().pixels() : frames().window().pixels();
 }
 
 // Once a frame.
@@ -97,7 +120,7 @@ void LeavingFrame::soften(OutputTask* task) {
 
 // From the canvas to where the frame's camera looked. level: L is needed.
 void LeavingFrame::return_to_camera(OutputTask* task, bool level) {
-  const Pose pose = this->pose();
+  const Pose pose = camera();
   if (pose.is_rest() || wishes().stabilize_output) return;
   for (int c = 0; c < kChannels; ++c) task->x[c] = frames().untouched(slot(), c);
   Restorer& restorer = *stage_.restorer;
@@ -119,6 +142,20 @@ void LeavingFrame::return_to_camera(OutputTask* task, bool level) {
     task->shaded = ignore(restorer.restore_shaded(pose, task->shaded, resampler, pool()));
 }
 
+// To the frame's own size, where less was looked at.
+void LeavingFrame::enlarge(OutputTask* task) {
+  if (!stage_.enlarger) return;
+  if (task->mask && (camera().is_rest() || wishes().stabilize_output)) {
+    // Frame and L are those that the mask was made of.
+    const Decision& decision = stage_.background->decision();
+    const uint8_t* level[kChannels];
+    decision.level(0, level);
+    std::copy_n(level, kChannels, task->level);
+    task->level_stride = decision.level_stride();
+  }
+  stage_.enlarger->enlarge(task, pool());
+}
+
 void LeavingFrame::write(Output output, const Levels& levels, const MutableImageView& out) {
   const Clock::Span span(*stage_.clock, Clock::frames);
   flushed_if_it_throws(this, [&] {
@@ -137,19 +174,20 @@ void LeavingFrame::write(Output output, const Levels& levels, const MutableImage
     }
     if (masked && wishes().mask_softness > 0) soften(&task);
     return_to_camera(&task, output == Output::background || output == Output::foreground);
+    enlarge(&task);
     write(task, levels, out);
   });
 }
 
 void LeavingFrame::write(const OutputTask& task, const Levels& levels,
                          const MutableImageView& out) {
-  const int height = frames().height(), together = rows_together(out);
+  const int height = out.height, together = rows_together(out);
   const int steps = (height + together - 1) / together;
   const auto write = [&](int first, int count) {
     const int row = first * together;
     write_picture(task, levels, out, row, std::min(count * together, height - row));
   };
-  for_rows(pool(), steps, frames().window().pixels(), write);
+  for_rows(pool(), steps, static_cast<size_t>(out.width) * static_cast<size_t>(height), write);
 }
 
 void LeavingFrame::write_frame(const Levels& levels, const MutableImageView& out) {
@@ -157,10 +195,11 @@ void LeavingFrame::write_frame(const Levels& levels, const MutableImageView& out
   flushed_if_it_throws(this, [&] {
     OutputTask task = task_of(Output::cutout);
     read();
-    // All of it is cut out.
-    everything_.resize(frames().window().pixels(), 255);
-    if (!pose().is_rest() && !wishes().stabilize_output)
+    if (!camera().is_rest() && !wishes().stabilize_output)
       for (int c = 0; c < kChannels; ++c) task.x[c] = frames().untouched(slot(), c);
+    enlarge(&task);
+    // All of it is cut out.
+    everything_.resize(pixels(), 255);
     task.mask = everything_.data();
     write(task, levels, out);
   });
@@ -172,6 +211,7 @@ const uint8_t* LeavingFrame::mask() {
     OutputTask task = task_of(Output::mask);
     decide(&task);
     return_to_camera(&task, false);
+    enlarge(&task);
     return task.mask;
   });
 }
@@ -182,7 +222,7 @@ void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
     OutputTask task = task_of(Output::mask);
     decide(&task);
     return_to_camera(&task, true);
-    std::copy_n(task.mask, frames().window().pixels(), mask);
+    uint8_t* const lengths = stage_.enlarger ? stage_.enlarger->room() : residual;
     const auto width = static_cast<size_t>(frames().width());
     for (int y = 0; y < frames().height(); ++y) {
       const size_t first = static_cast<size_t>(y) * width;
@@ -191,8 +231,11 @@ void LeavingFrame::foreground(uint8_t* mask, uint8_t* residual) {
       const uint8_t* level[3];
       stage_.background->decision().level(y, level);
       for (int c = 0; task.level[0] && c < kChannels; ++c) level[c] = task.level[c].high + first;
-      residual_norm(x, level, width, residual + first);
+      residual_norm(x, level, width, lengths + first);
     }
+    if (stage_.enlarger) stage_.enlarger->repeat(lengths, residual, pool());
+    enlarge(&task);
+    std::copy_n(task.mask, pixels(), mask);
   });
 }
 

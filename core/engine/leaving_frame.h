@@ -55,6 +55,7 @@ class LeavingFrame {
     bool meet = false, read = false, decide = false, soften = false;
   };
 
+  Pose camera() const;
   OutputTask task_of(Output output);
   void meet();
   void read();
@@ -62,6 +63,8 @@ class LeavingFrame {
   void soften(OutputTask* task);
   void write(const OutputTask& task, const Levels& levels, const MutableImageView& out);
   void return_to_camera(OutputTask* task, bool level);
+  void enlarge(OutputTask* task);
+  size_t pixels() const;
   FrameStore& frames() const { return *stage_.frames; }
   const Wishes& wishes() const { return stage_.background->wishes(); }
   int slot() const { return frames().slot(schedule_->next_index()); }

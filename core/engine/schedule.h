@@ -10,6 +10,7 @@
 #include "core/base/status.h"
 #include "core/engine/background.h"
 #include "core/engine/pace.h"
+#include "core/foreground/enlarger.h"
 #include "core/frames/frame_store.h"
 #include "core/parallel/workers.h"
 
@@ -25,6 +26,8 @@ struct Stage {
   // Where the camera may move; or null, both.
   Stabilizer* stabilizer = nullptr;
   Restorer* restorer = nullptr;
+  // Where frames are larger than what is learnt of them; or null.
+  Enlarger* enlarger = nullptr;
 };
 
 // Frames that were pushed and wait to be popped: the newest `pending` of the store. The oldest

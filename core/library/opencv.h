@@ -148,6 +148,7 @@ class BackgroundSubtractor : public cv::BackgroundSubtractor {
     see("absorb_frames", &options->absorb_frames);
     see("frame_rate", &options->frame_rate);
     see("time_budget", &options->time_budget);
+    see("mask_scale", &options->mask_scale);
     see("threads", &options->threads);
     see("max_memory", &options->max_memory);
   }

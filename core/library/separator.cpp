@@ -51,7 +51,13 @@ struct Kind {
   bool operator==(const Kind&) const = default;
 };
 
-EngineOptions engine_options(const Options& options, const Kind& kind) {
+// masks_alone: as far as it is known, nobody is going to ask for another picture.
+int mask_scale_of(const Options& options, const Kind& kind, bool masks_alone) {
+  if (options.mask_scale != 0) return options.mask_scale;
+  return masks_alone ? Reduction::automatic_scale(kind.width, kind.height) : 1;
+}
+
+EngineOptions engine_options(const Options& options, const Kind& kind, bool masks_alone = false) {
   EngineOptions result;
   result.mode = options.mode == Mode::live ? qdmd::Mode::live : qdmd::Mode::batch;
   result.method = method_of(options.method);
@@ -71,8 +77,10 @@ EngineOptions engine_options(const Options& options, const Kind& kind) {
   result.mask_softness = options.mask_softness;
   // The engine's own rate would be for frames that come while a window is solved: here none do.
   result.steps = at_rate(result.steps, options.frame_rate);
+  result.mask_scale = mask_scale_of(options, kind, masks_alone);
   result.threads = options.threads;
   result.max_memory = options.max_memory;
+  result.window_on_disk = options.window_on_disk;
   result.colours = kind.colours;
   result.depth = kind.depth;
   return result;
@@ -197,18 +205,23 @@ struct Separator::State {
   }
 
   // Where it refuses, all is as it was.
-  void configure(const Kind& wanted) {
+  void configure(const Kind& wanted, bool masks_alone) {
     if (engine.configured() && wanted == kind) return;
-    if (loaded) check_loaded(wanted);
-    check(engine.configure(engine_options(options, wanted), wanted.width, wanted.height));
+    EngineOptions its = engine_options(options, wanted, masks_alone);
+    // What was saved of frames in all their pixels goes on so.
+    const bool whole = loaded && loaded->width == wanted.width && loaded->height == wanted.height;
+    if (options.mask_scale == 0 && whole) its.mask_scale = 1;
+    if (loaded) check_loaded(wanted, its.mask_scale);
+    check(engine.configure(its, wanted.width, wanted.height));
     kind = wanted;
     if (loaded) check(engine.learn_from(*loaded));
     end();
   }
 
   // What was loaded before the first frame belongs to frames like these.
-  void check_loaded(const Kind& wanted) {
-    if (loaded->width == wanted.width && loaded->height == wanted.height &&
+  void check_loaded(const Kind& wanted, int scale) {
+    const Reduction its = {wanted.width, wanted.height, scale};
+    if (loaded->width == its.small_width() && loaded->height == its.small_height() &&
         loaded->colours == wanted.colours)
       return;
     const std::string size = std::to_string(loaded->width) + "x" + std::to_string(loaded->height);
@@ -224,6 +237,7 @@ struct Separator::State {
     return *frame;
   }
 
+  void push(const void* frame, const Layout& layout, bool masks_alone);
   void write(LeavingFrame* frame, Output output, const Layout& layout, void* picture);
 
   // Its objects, once a frame.
@@ -322,12 +336,17 @@ Separator& Separator::operator=(Separator&&) noexcept = default;
 
 void Separator::push(const void* frame, const Layout& layout) {
   check_layout(frame, layout);
-  if (ready()) throw std::invalid_argument("skip() the frames that are ready before you push more");
-  state_->configure(kind_of(layout));
+  state_->push(frame, layout, false);
+}
+
+void Separator::State::push(const void* frame, const Layout& layout, bool masks_alone) {
+  if (engine.next())
+    throw std::invalid_argument("skip() the frames that are ready before you push more");
+  configure(kind_of(layout), masks_alone);
   // A frame whose objects were followed was lost.
-  if (std::exchange(state_->followed, false)) ++state_->frames;
-  check(state_->engine.push(view_of(static_cast<const uint8_t*>(frame), layout), &state_->wishes));
-  state_->loaded.reset();
+  if (std::exchange(followed, false)) ++frames;
+  check(engine.push(view_of(static_cast<const uint8_t*>(frame), layout), &wishes));
+  loaded.reset();
 }
 
 bool Separator::ready() const { return state_->engine.next() != nullptr; }
@@ -387,7 +406,8 @@ void Separator::apply(const void* frame, const Layout& layout, uint8_t* mask,
   of_mask.pixels = Pixels::grey;
   of_mask.depth = 8;
   check_layout(mask, of_mask);
-  push(frame, layout);
+  check_layout(frame, layout);
+  state_->push(frame, layout, true);
   LeavingFrame& leaving = state_->leaving();
   state_->write(&leaving, Output::mask, of_mask, mask);
   // Who is told may throw: the frame has left by then.
@@ -458,8 +478,11 @@ void Separator::load(const uint8_t* bytes, size_t size) {
     check(its.engine.learn_from(learnt));
     return;
   }
-  // Its background can be had before the first frame.
-  const Kind kind = {learnt.width, learnt.height, learnt.colours, learnt.picture.depth};
+  // Its background can be had before the first frame, in the size that it was learnt in, enlarged
+  // as frames ask for it.
+  const int scale = std::max(1, its.options.mask_scale);
+  const Kind kind = {scale * learnt.width, scale * learnt.height, learnt.colours,
+                     learnt.picture.depth};
   if (kind.colours == Colours::yuv)
     throw std::invalid_argument(
         "it is the background of YUV video: save that of video in RGB or grey");

@@ -57,8 +57,15 @@ struct Options {
   // it.
   double frame_rate = 25;
   double time_budget = 0;  // milliseconds that a frame may take on average; 0: no limit
-  int threads = 0;         // up to 256; 0: one for each core. Changes no result
+  // Masks are found in a picture so many times smaller in each direction: 1, 2 or 4. Other pictures
+  // have no more pixels than that, either. 0: 1, unless the first frame comes by apply() and has
+  // more than 2.5 million pixels: then 2, and 4 above 20 million.
+  int mask_scale = 0;
+  int threads = 0;                          // up to 256; 0: one for each core. Changes no result
   uint64_t max_memory = uint64_t{4} << 30;  // bytes
+  // A folder where the frames of the window lie in a file, for windows that are larger than the
+  // machine's memory; empty: in memory.
+  std::string window_on_disk;
   // Things are followed: objects() and on_event().
   bool follow_objects = false;
   double object_min_size = 1.0 / 60;  // longer side of what is told of, parts of the height

@@ -286,6 +286,19 @@ void BackgroundModel::evaluate(size_t first, size_t count, const MutableSamples 
   for (size_t c = 0; c < kChannels; ++c) split_digits(samples[c], depth_, count, out[c]);
 }
 
+void BackgroundModel::evaluate_all(size_t pixels, const MutableSamples out[3], Pool* pool) const {
+  const auto make = [&](size_t run) {
+    const size_t first = run * kMaxRun;
+    const MutableSamples to[3] = {out[0] + first, out[1] + first, out[2] + first};
+    evaluate(first, std::min(kMaxRun, pixels - first), to);
+  };
+  const size_t runs = (pixels + kMaxRun - 1) / kMaxRun;
+  if (pool)
+    pool->run(runs, make);
+  else
+    for (size_t run = 0; run < runs; ++run) make(run);
+}
+
 void BackgroundModel::freeze_at(double t) {
   if (frozen_) return;
   set_time(t);

@@ -8,6 +8,7 @@
 #include "core/base/channels.h"
 #include "core/base/large_vector.h"
 #include "core/dmd/temporal_model.h"
+#include "core/parallel/pool.h"
 #include "core/passes/combine.h"
 #include "core/passes/rgb_colours.h"
 #include "core/planes/owned_picture.h"
@@ -125,6 +126,8 @@ class BackgroundModel {
   // L in all bits, as frames are kept. If there are more than eight, the highest need not be those
   // of evaluate(), which does not round up to them.
   void evaluate(size_t first, size_t count, const MutableSamples out[3]) const;
+  // The same of all `pixels` pixels. pool may be null.
+  void evaluate_all(size_t pixels, const MutableSamples out[3], Pool* pool) const;
 
  private:
   size_t picture_count() const { return pictures_.size(); }

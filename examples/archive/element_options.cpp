@@ -26,7 +26,8 @@ constexpr const char* kLeftOut[] = {"name",
                                     "object-appear-time",
                                     "object-stop-time",
                                     "object-gone-time",
-                                    "motion-end-time"};
+                                    "motion-end-time",
+                                    "mask-scale"};
 
 // As an application makes one, which elements ask for their name.
 ElementPtr new_element() {

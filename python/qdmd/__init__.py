@@ -74,8 +74,11 @@ class Separator:
     ignore                rectangles (x, y, width, height), 64 at most, in which nothing is foreground
     absorb_time           seconds until what came and stands is background; 0: never
     time_budget           milliseconds that a frame may take on average; 0: no limit
+    mask_scale            masks are found in a picture so many times smaller: 1, 2 or 4; 0: chosen, where apply() is the
+                          first call, from the size of the frame
     n_threads             0: one for each core. Changes no result
     max_memory            bytes
+    window_on_disk        a folder where the frames of the window lie in a file; None: in memory
     load_location         a file of save() to go on from
 
     Three more are not the element's, which knows them from its video:
@@ -93,8 +96,9 @@ class Separator:
                  estimator: str = 'exact', sample_step: int = 0, iterations: int = 1,
                  stabilize: str = 'translation', stabilize_output: bool = False, foreground_threshold: float = 0.0,
                  shadows: str = 'background', mask_softness: int = 0, ignore: Iterable[Rectangle] = (),
-                 absorb_time: float = 300.0, time_budget: float = 0.0, n_threads: int = 0,
-                 max_memory: int = 4 << 30, load_location: Optional[Union[str, os.PathLike[str]]] = None,
+                 absorb_time: float = 300.0, time_budget: float = 0.0, mask_scale: int = 0, n_threads: int = 0,
+                 max_memory: int = 4 << 30, window_on_disk: Optional[Union[str, os.PathLike[str]]] = None,
+                 load_location: Optional[Union[str, os.PathLike[str]]] = None,
                  frame_rate: float = 25.0, depth: int = 16, bgr: bool = False) -> None:
         if not absorb_time >= 0 or not frame_rate > 0:
             raise ValueError('absorb_time must be 0 (never) or more seconds, and frame_rate above 0')
@@ -105,7 +109,8 @@ class Separator:
             sample_step=sample_step, iterations=iterations, stabilize=stabilize, stabilize_output=stabilize_output,
             foreground_threshold=foreground_threshold, shadows=shadows, mask_softness=mask_softness,
             ignore=_rectangles(ignore), absorb_frames=absorb_frames, frame_rate=frame_rate,
-            time_budget=time_budget, n_threads=n_threads, max_memory=max_memory), depth, bgr)
+            time_budget=time_budget, mask_scale=mask_scale, n_threads=n_threads, max_memory=max_memory,
+            window_on_disk=os.fspath(window_on_disk or '')), depth, bgr)
         self._delay = window_size - 1 if mode == 'batch' else 0
         self._waiting = 0
         if load_location is not None:
@@ -286,7 +291,8 @@ def decompose(frames: Iterable[Frame], *, rank: int = 0, omega_threshold: float 
         mode='batch', method='qdmd', window_size=100, hop_size=0, rank=rank, omega_threshold=omega_threshold,
         amplitude=amplitude, solver=solver, estimator=estimator, sample_step=0, iterations=1, stabilize='off',
         stabilize_output=False, foreground_threshold=0.0, shadows='background', mask_softness=0, ignore=[],
-        absorb_frames=0, frame_rate=25.0, time_budget=0.0, n_threads=n_threads, max_memory=4 << 30)
+        absorb_frames=0, frame_rate=25.0, time_budget=0.0, mask_scale=1, n_threads=n_threads,
+        max_memory=4 << 30, window_on_disk='')
     if len(pictures) < 2:
         raise ValueError('give at least two frames')
     found = _native.decompose(pictures, settings, depth)

@@ -258,8 +258,10 @@ Options options_of(const py::dict& settings) {
   set("absorb_frames", &options.absorb_frames);
   set("frame_rate", &options.frame_rate);
   set("time_budget", &options.time_budget);
+  set("mask_scale", &options.mask_scale);
   set("n_threads", &options.threads);
   set("max_memory", &options.max_memory);
+  set("window_on_disk", &options.window_on_disk);
   for (const auto& area : settings["ignore"].cast<std::vector<std::array<int, 4>>>())
     options.ignore.push_back({area[0], area[1], area[2], area[3]});
   return options;

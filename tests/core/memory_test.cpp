@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <random>
+#include <tuple>
 
 #include "tests/core/allocator.h"
 #include "tests/core/engine_util.h"
@@ -29,6 +30,7 @@ struct Case {
   int softness = 0;
   int depth = 8;
   bool shared = false;  // 4:2:0
+  int scale = 1;        // of masks
 };
 
 EngineOptions options_of(const Case& c) {
@@ -41,6 +43,7 @@ EngineOptions options_of(const Case& c) {
   options.frame_rate = c.rate;
   options.mask_softness = c.softness;
   options.depth = c.depth;
+  options.mask_scale = c.scale;
   if (c.shared) {
     options.colours = Colours::yuv;
     options.chroma_columns = options.chroma_rows = 2;
@@ -58,7 +61,8 @@ std::string describe(const Case& c) {
          std::to_string(c.threads) + " threads, " + alphas[static_cast<int>(c.alpha)] +
          (c.rate > 0 ? ", solved beside" : "") + (c.softness > 0 ? ", soft" : "") +
          (c.depth > 8 ? ", " + std::to_string(c.depth) + " bits" : "") +
-         (c.shared ? ", 4:2:0" : "");
+         (c.shared ? ", 4:2:0" : "") +
+         (c.scale > 1 ? ", masks of 1/" + std::to_string(c.scale) : "");
 }
 
 // The picture in samples of `depth` bits, whose low bits are noise.
@@ -289,6 +293,18 @@ TEST(Memory, OfSharedChroma) {
         c.shared = true;
         check(c);
       }
+}
+
+TEST(Memory, OfMasksOfASmallerPicture) {
+  if (!allocator::sees_all()) GTEST_SKIP();
+  for (Mode mode : {Mode::batch, Mode::live})
+    for (const auto& [scale, alpha, depth] :
+         {std::tuple{2, Alpha::none, 8}, {2, Alpha::varying, 8}, {4, Alpha::varying, 10}}) {
+      Case c;
+      c.mode = mode, c.scale = scale, c.alpha = alpha, c.depth = depth;
+      c.width = 401, c.height = 299, c.window = 60, c.threads = 2;
+      check(c);
+    }
 }
 
 TEST(Memory, OfSoftMasks) {

@@ -560,6 +560,62 @@ TEST(Separator, EachPictureIsTheElements) {
   }
 }
 
+TEST(Separator, MaskScaleIsTheElements) {
+  const auto frames = street(161, 120, 30);
+  Options options;
+  options.window_size = 20;
+  options.mask_scale = 2;
+  const auto expected = of_element(frames, "mode=live output=mask window-size=20 mask-scale=2 ");
+  ASSERT_EQ(expected.size(), frames.size());
+  Separator separator(options);
+  cv::Mat mask(120, 161, CV_8UC1), grey;
+  for (size_t t = 0; t < frames.size(); ++t) {
+    separator.apply(frames[t].data, layout_of(frames[t]), mask.data, 161);
+    cv::extractChannel(expected[t], grey, 0);
+    ASSERT_TRUE(equal(mask, grey)) << t;
+  }
+  // What was learnt has fewer pixels, and goes on with frames of this size.
+  const auto bytes = separator.save();
+  Separator next(options);
+  next.load(bytes.data(), bytes.size());
+  next.apply(frames[29].data, layout_of(frames[29]), mask.data, 161);
+  cv::Mat before(120, 161, CV_8UC3), after = before.clone();
+  ASSERT_TRUE(separator.background(layout_of(before), before.data));
+  ASSERT_TRUE(next.background(layout_of(after), after.data));
+  EXPECT_LT(cv::norm(before, after, cv::NORM_L1), 161 * 120 * 3);
+  options.mask_scale = 1;
+  Separator whole(options);
+  whole.load(bytes.data(), bytes.size());
+  EXPECT_THROW(whole.apply(frames[29].data, layout_of(frames[29]), mask.data, 161),
+               std::invalid_argument);
+  options.mask_scale = 3;
+  EXPECT_THROW(Separator{options}, std::invalid_argument);
+}
+
+// Who asks for masks alone has those of large frames from fewer pixels.
+TEST(Separator, MaskScaleIsChosenByTheFirstCall) {
+  constexpr int kWidth = 2000, kHeight = 1251;
+  cv::Mat frame(kHeight, kWidth, CV_8UC1), mask = frame.clone(), background = frame.clone();
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      frame.at<uint8_t>(y, x) = static_cast<uint8_t>(60 + (37 * x + 11 * y) % 97);
+  Options options;
+  options.window_size = 2;
+  for (const bool masks_alone : {true, false}) {
+    Separator separator(options);
+    for (int t = 0; t < 3; ++t) {
+      if (masks_alone) {
+        separator.apply(frame.data, layout_of(frame), mask.data, kWidth);
+      } else {
+        separator.push(frame.data, layout_of(frame));
+        separator.skip();
+      }
+    }
+    ASSERT_TRUE(separator.background(layout_of(background), background.data));
+    EXPECT_EQ(equal(background, frame), !masks_alone);
+  }
+}
+
 TEST(Separator, RegionsAreAroundWhatMoves) {
   Separator separator;
   cv::Mat frame(120, 160, CV_8UC3, cv::Scalar::all(100));

@@ -58,6 +58,13 @@ TEST(Properties, EveryOneIsReadBackAndDocumented) {
   EXPECT_EQ(2.5, gone);
   EXPECT_EQ(7, end);
 
+  guint scale = 5;
+  g_object_get(element, "mask-scale", &scale, nullptr);
+  EXPECT_EQ(0u, scale);
+  g_object_set(element, "mask-scale", 2u, nullptr);
+  g_object_get(element, "mask-scale", &scale, nullptr);
+  EXPECT_EQ(2u, scale);
+
   guint count = 0;
   GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element), &count);
   for (guint i = 0; i < count; ++i) {

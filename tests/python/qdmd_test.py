@@ -192,7 +192,10 @@ def test_settings_do_what_the_elements_do():
     plain = masks()
     assert not any(mask[:, :40].any() for mask in masks(ignore=[(0, 0, 40, HEIGHT)]))
     soft = masks(mask_softness=4)[-1]
+    small = masks(mask_scale=2)[-1]
     assert ((soft > 0) & (soft < 255)).any()
+    # Found in fewer pixels: not the same, but nearly.
+    assert 0 < ((small > 0) != (plain[-1] > 0)).sum() < 0.2 * (plain[-1] > 0).sum()
     assert not masks(foreground_threshold=442)[-1].any()
     assert all((one == other).all() for one, other in zip(plain, masks(n_threads=1)))
     assert any((one != other).any() for one, other in zip(plain, masks(method='qdmd')))
@@ -256,7 +259,7 @@ def test_save_and_load(tmp_path):
 @pytest.mark.parametrize('settings, word', [
     (dict(window_size=1), 'window-size'), (dict(mode='later'), 'live, batch'), (dict(hop_size=101), 'hop-size'),
     (dict(absorb_time=-1), 'absorb_time'), (dict(frame_rate=0), 'frame_rate'), (dict(solver='fast'), 'gram-extended'),
-    (dict(mask_softness=16), 'softness'),
+    (dict(mask_softness=16), 'softness'), (dict(mask_scale=3), 'mask-scale'),
     (dict(ignore=[(1, 2, 3)]), 'x, y, width, height'), (dict(ignore=[(1, 2, 0, 3)]), 'ignore'), (dict(depth=8), 'depth'),
     (dict(foreground_threshold=float('nan')), 'threshold'), (dict(time_budget=-1.0), 'time_budget')])
 def test_refused_settings_say_what_to_change(settings, word):
@@ -292,6 +295,16 @@ def test_memory_that_is_refused_is_named():
     with pytest.raises(ValueError, match='max-memory'):
         separator.apply(np.zeros((600, 800, 3), np.uint8))
     assert separator.background() is None
+
+
+def test_the_window_may_be_on_disk(tmp_path):
+    frames = street(30)
+    masks = [[separator.apply(frame).copy() for frame in frames]
+             for separator in (qdmd.Separator(window_size=12), qdmd.Separator(window_size=12, window_on_disk=tmp_path))]
+    assert (np.array(masks[0]) == np.array(masks[1])).all()
+    assert not any(tmp_path.iterdir())
+    with pytest.raises(ValueError, match='window-on-disk'):
+        qdmd.Separator(window_on_disk=tmp_path / 'none').apply(frames[0])
 
 
 def test_calls_out_of_turn_are_refused():
