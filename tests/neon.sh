@@ -25,7 +25,7 @@ in_root bash -c 'set -euo pipefail
   done
 
   wanted=(ccache meson ninja-build pkg-config g++ g++-aarch64-linux-gnu qemu-user python3-numpy libeigen3-dev
-    libboost-dev libcli11-dev nlohmann-json3-dev libgstreamer1.0-dev "${arm[@]}")
+    libboost-dev libcli11-dev nlohmann-json3-dev "${arm[@]}")
   dpkg-query -W -f "\${Status}\n" "${wanted[@]}" 2>/dev/null | grep -c "ok installed" >count || true
   [ "$(cat count)" -ne "${#wanted[@]}" ] || exit 0
   apt-get -qq update
