@@ -12,7 +12,7 @@ in_root() { tests/root.sh "$root" "$@"; }
 in_tree() { in_root nice -n 15 bash -c 'set -euo pipefail; cd /root/gst-qdmd; eval "$1"' bash "$1"; }
 tests=(kernel gram passes chroma digits combine mask_passes soft_mask resample robust_fill median_picture pool engine
   live golden element-negotiation element-stream element-live element-masks element-messages element-features
-  element-separate element-save library)
+  element-separate element-save element-analytics library)
 [ "$#" -eq 0 ] || tests=("$@")
 
 tests/root.sh --tree "$root"
