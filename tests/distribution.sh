@@ -3,30 +3,24 @@
 # Tries the last commit on another version of Debian, in a root of its own (tests/root.sh), from the
 # tarball that `meson dist` makes:
 #
-#   tests/distribution.sh SUITE [FLAG...]      SUITE: trixie (Debian 13), bookworm (12)
+#   tests/distribution.sh SUITE [PART...]      SUITE: trixie (Debian 13), bookworm (12)
 #
-# It builds with warnings as errors, runs the tests of the suite `fast`, the scenes and README.md's
-# commands: half an hour on two cores at first, some minutes later. Flags do more:
+#   commands     README.md's: the demo, and scenes through the element
+#   tests        builds with warnings as errors, and runs the tests of the suite `fast`
+#   all-tests    the same with all tests; those of recorded sequences are skipped
+#   packages     makes the Debian packages, has lintian look at them, installs, uses and removes them
 #
-#   --long       all tests (those of recorded sequences are skipped): an hour
-#   --packages   makes the Debian packages, has lintian look at them, installs, uses and removes them
+# Without a part: commands and tests, half an hour on two cores at first, some minutes later.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-usage() { sed -n '3,/^set/s/^# \?//p' tests/distribution.sh; }
+usage() { sed -n '3,/^set/{/^set/d;s/^# \?//p}' tests/distribution.sh; }
 suite=${1-}
 if [[ ! $suite =~ ^[a-z]+$ ]]; then
   usage >&2
   exit 2
 fi
 shift
-long=no packages=no
-for flag in "$@"; do
-  case "$flag" in
-    --long) long=yes ;;
-    --packages) packages=yes ;;
-    *) usage >&2; exit 2 ;;
-  esac
-done
+[ "$#" -gt 0 ] || set -- commands tests
 in_root() { tests/root.sh "$suite" "$@"; }
 # Within the tree there, at a low priority.
 in_tree() { in_root nice -n 15 bash -c 'set -euo pipefail; cd /root/gst-qdmd; eval "$1"' bash "$1"; }
@@ -38,33 +32,41 @@ tests/root.sh --tree "$suite"
 in_root bash -c 'command -v ccache || { apt-get -qq update; apt-get -qq install --no-install-recommends ccache; }' \
   >/dev/null 2>&1
 
-echo "== $suite: README.md's commands"
-in_tree 'examples/demo.sh >demo.log 2>&1 || { tail -n 40 demo.log; exit 1; }; tail -n 5 demo.log
-  GST_PLUGIN_PATH=$PWD/build/gst gst-launch-1.0 -q qdmdscenesrc scene=basic num-buffers=150 ! qdmdbackground ! \
-    videoconvert ! pngenc ! multifilesink location=build/street.png
-  [ -s build/street.png ]'
-
-echo "== $suite: tests"
-in_tree "$quiet"'
-  tests/install-dependencies.sh build test
-  quiet meson setup --reconfigure build -Dtests=enabled -Dscene=enabled'
-if [ "$long" = yes ]; then
+build_for_tests() {
   in_tree "$quiet"'
-    quiet ninja -C build -j "$(tests/jobs.sh)"
-    status=0
-    meson test -C build --no-rebuild --print-errorlogs -t 4 || status=$?
-    tests/count_results.py build; exit "$status"'
-else
-  in_tree 'tests/run.sh --fast'
-fi
-
-if [ "$packages" = yes ]; then
-  echo "== $suite: packages"
-  in_tree "$quiet"'
-    tests/install-dependencies.sh lint
-    quiet gst/make-package.sh
-    tests/install/packages_test.sh build/package'
-fi
+    tests/install-dependencies.sh build test
+    [ ! -f build/build.ninja ] || again=--reconfigure
+    quiet meson setup ${again-} build -Dtests=enabled -Dscene=enabled'
+}
+for part in "$@"; do
+  echo "== $suite: $part"
+  case "$part" in
+    commands)
+      in_tree 'examples/demo.sh >demo.log 2>&1 || { tail -n 40 demo.log; exit 1; }; tail -n 5 demo.log
+        GST_PLUGIN_PATH=$PWD/build/gst gst-launch-1.0 -q qdmdscenesrc scene=basic num-buffers=150 ! \
+          qdmdbackground ! videoconvert ! pngenc ! multifilesink location=build/street.png
+        [ -s build/street.png ]' ;;
+    tests)
+      build_for_tests
+      in_tree 'tests/run.sh --fast' ;;
+    all-tests)
+      build_for_tests
+      in_tree "$quiet"'
+        quiet ninja -C build -j "$(tests/jobs.sh)"
+        status=0
+        meson test -C build --no-rebuild --print-errorlogs -t 4 || status=$?
+        tests/count_results.py build
+        exit "$status"' ;;
+    packages)
+      in_tree "$quiet"'
+        tests/install-dependencies.sh lint
+        quiet gst/make-package.sh
+        tests/install/packages_test.sh build/package' ;;
+    *)
+      usage >&2
+      exit 2 ;;
+  esac
+done
 in_root bash -c '. /etc/os-release; printf "%s: %s, " "$(date +%F)" "$PRETTY_NAME"
   printf "g++ %s, GStreamer %s, OpenCV %s, Highway %s, Python %s\n" "$(g++ -dumpfullversion)" \
     "$(pkg-config --modversion gstreamer-1.0)" "$(pkg-config --modversion opencv4)" \
