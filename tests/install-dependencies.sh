@@ -21,7 +21,7 @@ test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-b
 # The module qdmd for Python.
 python=(pybind11-dev python3-dev python3-numpy)
 # What gst/debian/control asks for beyond build; tests make a package, too.
-package=(debhelper dpkg-dev dh-python help2man libopencv-dev libcli11-dev nlohmann-json3-dev libopenmpi-dev
+package=(build-essential debhelper dpkg-dev dh-python help2man libopencv-dev libcli11-dev nlohmann-json3-dev libopenmpi-dev
   pybind11-dev python3-dev python3-numpy libgstreamer-plugins-bad1.0-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
 demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
