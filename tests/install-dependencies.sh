@@ -3,7 +3,7 @@
 # nothing when all are there.
 #
 #   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
-#                                               fuzz, tidy, coverage, neon, python
+#                                               fuzz, tidy, coverage, neon, python, root, lint
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -11,16 +11,18 @@ build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins
 # plugins-bad has gstreamer-check's fakevideosink, -base the sources and converters, -ugly and -x what
 # the documentation's pipelines and the demo encode and write text with, -opencv the element that
 # tests/bench compares with, -libav the lossless encoder of qdmd-archive and what plays H.264 and
-# H.265 of 10 bits, openmpi what starts qdmd-archive; gi runs the examples in Python.
+# H.265 of 10 bits, openmpi what starts qdmd-archive; gi runs the examples in Python. Headers of plugins-bad
+# have analytics metadata from GStreamer 1.24 on.
 test=(python3 python3-numpy python3-gi gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0 valgrind
   clang-format libgtest-dev libbenchmark-dev libboost-dev libcli11-dev nlohmann-json3-dev
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x gstreamer1.0-opencv openmpi-bin
-  libopenmpi-dev pybind11-dev python3-dev python3-pytest appstream)
+  libopenmpi-dev pybind11-dev python3-dev python3-pytest appstream libgstreamer-plugins-bad1.0-dev)
 # The module qdmd for Python.
 python=(pybind11-dev python3-dev python3-numpy)
 # What gst/debian/control asks for beyond build; tests make a package, too.
-package=(debhelper dpkg-dev libopencv-dev)
+package=(build-essential debhelper dpkg-dev dh-python help2man libopencv-dev libcli11-dev nlohmann-json3-dev libopenmpi-dev
+  pybind11-dev python3-dev python3-numpy libgstreamer-plugins-bad1.0-dev)
 # -libav decodes the street scene, -ugly encodes H.264, -x writes text.
 demo=(gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good
   gstreamer1.0-plugins-ugly gstreamer1.0-libav gstreamer1.0-x)
@@ -33,6 +35,9 @@ tidy=(clang-tidy)
 coverage=(clang llvm)
 # The compiler for 64-bit ARM, its C library, and what runs its programs.
 neon=(make g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
+# What makes the roots of tests/root.sh, and what looks at packages.
+root=(mmdebstrap debian-archive-keyring)
+lint=(lintian)
 
 wanted=()
 for group in "$@"; do
@@ -48,7 +53,9 @@ for group in "$@"; do
     coverage) wanted+=("${coverage[@]}") ;;
     neon) wanted+=("${neon[@]}") ;;
     python) wanted+=("${python[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon, python)" >&2; exit 2 ;;
+    root) wanted+=("${root[@]}") ;;
+    lint) wanted+=("${lint[@]}") ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon, python, root, lint)" >&2; exit 2 ;;
   esac
 done
 

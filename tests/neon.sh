@@ -1,61 +1,69 @@
 #!/usr/bin/env bash
-# Builds core/ for 64-bit ARM, whose vectors are NEON, with a cross compiler, and runs tests under
-# QEMU: the passes against their slow references, and whether scenes give the bytes that they give
-# here. Half an hour, most of it compiling; everything is kept in build-neon.
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Cross-builds the last commit for 64-bit Arm, whose vectors are NEON, in a root of Debian 13
+# (tests/root.sh), and runs tests of the core and of the elements under QEMU: once as a processor without
+# dot-product instructions (Cortex-A53), once as one that has all that QEMU knows (max).
 #
-#   tests/neon.sh [TEST...]      by their names in tests/core (default: those of the passes, golden)
+#   tests/neon.sh [TEST...]      by meson's names; without, those of `tests` below: an hour
 set -euo pipefail
 cd "$(dirname "$0")/.."
-tests/install-dependencies.sh build neon
-tests=("$@")
-[ "$#" -gt 0 ] || tests=(kernel gram passes chroma digits combine mask_passes soft_mask resample robust_fill median_picture pool golden)
-build=$PWD/build-neon
-mkdir -p "$build/packages"
+root=trixie-arm64
+in_root() { tests/root.sh "$root" "$@"; }
+in_tree() { in_root nice -n 15 bash -c 'set -euo pipefail; cd /root/gst-qdmd; eval "$1"' bash "$1"; }
+tests=(kernel gram passes chroma digits combine mask_passes soft_mask resample robust_fill median_picture pool engine
+  live golden element-negotiation element-stream element-live element-masks element-messages element-features
+  element-separate element-save element-analytics library)
+[ "$#" -eq 0 ] || tests=("$@")
 
-# ARM's libraries in a folder of their own: the machine's list of architectures stays as it is.
-if [ ! -e "$build/root/usr/include/hwy" ]; then
-  state=(-o APT::Architecture=arm64 -o APT::Architectures=arm64 -o Dir::State="$build/apt"
-    -o Dir::State::status=/dev/null -o Dir::Cache="$build/apt" -o APT::Sandbox::User=root)
-  mkdir -p "$build/apt/lists/partial" "$build/apt/archives/partial"
-  (cd "$build/packages" &&
-    apt-get -q "${state[@]}" update && apt-get -q "${state[@]}" download libhwy1 libhwy-dev libgtest-dev) \
-    >"$build/packages.log" 2>&1 || { tail -n 20 "$build/packages.log" >&2; exit 1; }
-  for package in "$build"/packages/*.deb; do dpkg -x "$package" "$build/root"; done
-fi
-libraries=$build/root/usr/lib/aarch64-linux-gnu
+tests/root.sh --tree "$root"
+in_root bash -c 'set -euo pipefail
+  dpkg --add-architecture arm64
+  arm=()
+  for name in libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev libhwy-dev \
+    libopencv-dev libgtest-dev libbenchmark-dev gstreamer1.0-plugins-base gstreamer1.0-plugins-bad; do
+    arm+=("$name:arm64")
+  done
 
-# Scenes are rendered here, with OpenCV.
-[ -f build/build.ninja ] || meson setup build -Dtests=enabled -Dscene=enabled >"$build/meson.log"
-mkdir -p "$build/frames"
-export QDMD_GOLDEN_FRAMES=$build/frames
-if [ "$(find "$build/frames" -name '*.raw' | wc -l)" -lt 3 ]; then
-  ninja -C build -j "$(tests/jobs.sh)" tests/core/golden_test >"$build/make.log"
-  build/tests/core/golden_test --gtest_brief=1
-fi
+  wanted=(ccache meson ninja-build pkg-config g++ g++-aarch64-linux-gnu qemu-user python3-numpy libeigen3-dev
+    libboost-dev libcli11-dev nlohmann-json3-dev "${arm[@]}")
+  dpkg-query -W -f "\${Status}\n" "${wanted[@]}" 2>/dev/null | grep -c "ok installed" >count || true
+  [ "$(cat count)" -ne "${#wanted[@]}" ] || exit 0
+  apt-get -qq update
+  apt-get -qq install --no-install-recommends "${wanted[@]}"' >build/neon.log 2>&1 ||
+  { tail -n 20 build/neon.log >&2; exit 1; }
 
-# Effects that need OpenCV are not there, and are not called.
-cat >"$build/Makefile" <<MAKE
-CXX = ${ARM_CXX:-aarch64-linux-gnu-g++}
-FLAGS = -std=c++20 -O2 -ffp-contract=off -I. -isystem $build/root/usr/include -isystem /usr/include/eigen3 \\
-  -DQDMD_GOLDEN_FILE='"$PWD/tests/core/golden.txt"'
-SOURCES = \$(shell git grep -L opencv2/ 'core/*.cpp' ':!core/library' ':!core/metrics')
-OBJECTS = \$(SOURCES:%.cpp=$build/%.o)
-.PRECIOUS: $build/%.o
-$build/%_test: $build/tests/core/%_test.o $build/tests/core/test_util.o $build/core.a
-	\$(CXX) \$^ -o \$@ -L$libraries -Wl,--unresolved-symbols=ignore-all -lgtest_main -lgtest -lhwy -pthread
-$build/core.a: \$(OBJECTS)
-	rm -f \$@; aarch64-linux-gnu-ar rcs \$@ \$^
-$build/%.o: %.cpp
-	@mkdir -p \$(@D); echo \$<
-	@\$(CXX) \$(FLAGS) -MMD -c \$< -o \$@
--include \$(shell find $build -name '*.d')
-MAKE
-programs=("${tests[@]/#/$build/}")
-make -f "$build/Makefile" -j "$(tests/jobs.sh)" "${programs[@]/%/_test}" \
-  >"$build/make.log" 2>&1 || { tail -n 30 "$build/make.log" >&2; exit 1; }
-
-for test in "${tests[@]}"; do
-  echo "== $test: NEON"
-  qemu-aarch64-static -L /usr/aarch64-linux-gnu -E LD_LIBRARY_PATH="$libraries" \
-    "$build/${test}_test" --gtest_brief=1
+in_tree 'cat >arm.ini <<INI
+[binaries]
+cpp = ["ccache", "aarch64-linux-gnu-g++"]
+ar = "aarch64-linux-gnu-ar"
+strip = "aarch64-linux-gnu-strip"
+pkg-config = "pkg-config"
+exe_wrapper = "qemu-aarch64"
+[properties]
+pkg_config_libdir = ["/usr/lib/aarch64-linux-gnu/pkgconfig", "/usr/share/pkgconfig"]
+[host_machine]
+system = "linux"
+cpu_family = "aarch64"
+cpu = "aarch64"
+endian = "little"
+INI
+sed -i "s/\"/\x27/g" arm.ini
+meson setup --cross-file arm.ini build -Dtests=enabled -Dscene=enabled -Dexamples=disabled -Dpython=disabled >setup.log 2>&1 ||
+  { tail -n 20 setup.log; exit 1; }'
+targets() {
+  in_tree 'meson introspect build --tests | python3 -c "
+import json, os, sys
+names = sys.argv[1:]
+tests = [t for t in json.load(sys.stdin) if t[\"name\"] in names]
+print(*sorted({os.path.relpath(w, os.path.abspath(\"build\")) for t in tests for w in t[\"cmd\"] if \"/build/\" in w}))" '"$*"
+}
+echo "== compiling for arm64"
+in_tree "ninja -C build -j \"\$(tests/jobs.sh)\" gst/libgstqdmd.so gst/libgstqdmdscene.so $(targets "${tests[@]}") >make.log 2>&1 ||
+  { grep -A20 FAILED make.log | head -n 40; exit 1; }"
+for cpu in cortex-a53 max; do
+  echo "== QEMU as $cpu"
+  in_tree "export QEMU_CPU=$cpu GST_REGISTRY_FORK=no
+    status=0
+    meson test -C build --no-rebuild --print-errorlogs -t 20 ${tests[*]} || status=\$?
+    tests/count_results.py build; exit \"\$status\""
 done

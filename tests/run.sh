@@ -31,23 +31,6 @@ groups=(build test)
 [ "$fast" = yes ] || groups+=(package)
 tests/install-dependencies.sh "${groups[@]}"
 
-# Adds up a meson test log: GoogleTest's own cases are counted, not programs.
-count_results() {
-  /usr/bin/python3 - "$1/meson-logs/testlog.junit.xml" <<'PYTHON'
-import sys
-import xml.etree.ElementTree as tree
-
-cases = failed = skipped = 0
-for case in tree.parse(sys.argv[1]).iter('testcase'):
-    cases += 1
-    if case.find('failure') is not None or case.find('error') is not None:
-        failed += 1
-    elif case.find('skipped') is not None:
-        skipped += 1
-print(cases - failed - skipped, failed, skipped)
-PYTHON
-}
-
 echo "== formatting"
 formatted=yes
 list_sources() {
@@ -89,7 +72,7 @@ status=0
 suite=()
 [ "$fast" = no ] || suite=(--suite fast)
 meson test -C build --no-rebuild --print-errorlogs "${suite[@]}" || status=$?
-read -r passed failed skipped <<<"$(count_results build)"
+read -r passed _ failed _ skipped _ <<<"$(tests/count_results.py build)"
 # A program that dies without a report of its own is a failure too.
 [ "$status" -eq 0 ] || [ "$failed" -gt 0 ] || failed=1
 

@@ -79,10 +79,13 @@ class BackgroundSubtractor : public cv::BackgroundSubtractor {
     file << "name" << kName;
     Options options = options_;
     each_number(&options, [&](const char* name, auto* value) {
-      // FileStorage has no whole numbers of 64 bits.
       using Value = std::remove_pointer_t<decltype(value)>;
-      constexpr bool kLong = std::is_floating_point_v<Value> || sizeof(Value) > sizeof(int);
-      file << name << static_cast<std::conditional_t<kLong, double, int>>(*value);
+      if constexpr (std::is_floating_point_v<Value>)
+        file << name << static_cast<double>(*value);
+      else if constexpr (kIsLong<Value>)
+        file << name << std::to_string(*value);
+      else
+        file << name << static_cast<int>(*value);
     });
     file << "ignore"
          << "[";
@@ -98,7 +101,14 @@ class BackgroundSubtractor : public cv::BackgroundSubtractor {
     Options options;
     each_number(&options, [&](const char* name, auto* value) {
       using Value = std::remove_pointer_t<decltype(value)>;
-      if (!node[name].empty()) *value = static_cast<Value>(static_cast<double>(node[name]));
+      const cv::FileNode number = node[name];
+      if constexpr (kIsLong<Value>) {
+        if (number.isString()) {
+          *value = internal::guarded([&] { return std::stoull(static_cast<std::string>(number)); });
+          return;
+        }
+      }
+      if (!number.empty()) *value = static_cast<Value>(static_cast<double>(number));
     });
     std::vector<int> sides;
     if (!node["ignore"].empty()) node["ignore"] >> sides;
@@ -121,6 +131,11 @@ class BackgroundSubtractor : public cv::BackgroundSubtractor {
 
  private:
   static constexpr const char* kName = "BackgroundSubtractor_QDMD";
+
+  // FileStorage has no whole numbers of 64 bits, and OpenCV 4.10 reads large real ones without a
+  // fraction as 32 bits: they are kept as text.
+  template <typename Value>
+  static constexpr bool kIsLong = std::is_integral_v<Value> && sizeof(Value) > sizeof(int);
 
   static Options live(Options options) {
     options.mode = Mode::live;

@@ -1,6 +1,7 @@
 // The layouts of video in memory, sample by sample: what views of it have to mean.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <random>

@@ -8,13 +8,18 @@
 # qdmd-evaluate scores; both are those of the scene before the encoder. An encoder remembers frames, so
 # that none follows from its number alone: it can be no effect of the scene.
 set -euo pipefail
-if [ $# -lt 2 ]; then
-  sed -n '2,4s/^# \?//p' "$0" >&2
+usage() { sed -n '2,/^set/{/^set/d;s/^# \?//;s/scene_sequence.sh/'"$(basename "$0")/;p}" "$0"; }
+if [ "${1-}" = --help ]; then
+  usage
+  exit
+elif [ $# -lt 2 ]; then
+  usage >&2
   exit 2
 fi
 folder=$1 scene=$2 rate=${3:-100} frames=${4:-200}
-: "${GST_PLUGIN_PATH_1_0:=$(dirname "$(realpath "$0")")/../../build/gst}"
-export GST_PLUGIN_PATH_1_0
+# In the project's folder, the plugins of its build folder.
+built=$(dirname "$(realpath "$0")")/../../build/gst
+[ ! -d "$built" ] || export GST_PLUGIN_PATH_1_0="${GST_PLUGIN_PATH_1_0:-$built}"
 
 # Several threads would share out the bits in another way on each machine. I420 is what cameras send;
 # straight from there to RGB videoconvert is quick and 3.5 levels too dark, by way of 16 bits it is not.

@@ -6,6 +6,7 @@
 // Ends with 1 where there was no input: a folder that moved is no success.
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>

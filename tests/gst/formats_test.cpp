@@ -1,6 +1,7 @@
 // Y, U and V in every layout against a plain reference: each sample given to the pixels that share
 // it, the element on these, and the mean of what comes out. The same of all depths.
 #include <array>
+#include <cmath>
 
 #include "tests/gst/video_frames.h"
 

@@ -1,4 +1,5 @@
 // mode=live: no delay, one buffer out for each in, whatever happens to the stream; freeze, reset.
+#include <cmath>
 #include <string>
 
 #include "tests/gst/element_test.h"

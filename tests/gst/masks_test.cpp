@@ -1,6 +1,7 @@
 // What masks leave out and how they fade, as users ask for it.
 #include <gst/video/gstvideometa.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 

@@ -1,4 +1,6 @@
 // Formats, strides, latency, limits, states.
+#include <cmath>
+
 #include "tests/gst/element_test.h"
 
 namespace qdmd::test {

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Makes the Debian packages and tries what is in them: package_test.sh SOURCE BUILD VERSION.
+# Makes the Debian packages of the plugins and tries what is in them: package_test.sh SOURCE BUILD VERSION.
 #
-# The packages hold the plugins of BUILD, since compiling takes minutes; with QDMD_TEST_PACKAGE=1 they
-# are built from SOURCE by gst/make-package.sh. With QDMD_TEST_INSTALL=1, as root, they are installed on
-# this machine and removed again, too.
+# The packages hold the plugins of BUILD, since compiling takes minutes; with QDMD_TEST_PACKAGE=1 all
+# packages are built from SOURCE by gst/make-package.sh. With QDMD_TEST_INSTALL=1, as root, they are
+# installed on this machine, used, and removed again, too: by packages_test.sh beside this file.
 set -euo pipefail
 tests=$(realpath "$(dirname "$0")")
 source=$1
@@ -16,12 +16,12 @@ command -v dh >/dev/null || { echo "debhelper is not installed"; exit 77; }
 folder=usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)/gstreamer-1.0
 
 package_of_build() {
+  export DH_OPTIONS="-pgstreamer1.0-qdmd -pgstreamer1.0-qdmd-scene"
   mkdir -p "debian/tmp/$folder"
   cp "$build"/gst/*.so "debian/tmp/$folder"
   mkdir -p debian/tmp/usr/share/metainfo
   cp "$source"/gst/*.metainfo.xml debian/tmp/usr/share/metainfo
   dh_install
-  dh_missing
   dh_installdocs
   dh_installchangelogs
   dh_compress
@@ -67,16 +67,7 @@ EOF
 "$tests/try_plugin.sh" "$work/root/$folder"
 
 # Where they are installed already, they stay.
-if [ "${QDMD_TEST_INSTALL:-0}" = 1 ] && [ "$(id -u)" -eq 0 ] &&
+if [ "${QDMD_TEST_PACKAGE:-0}" = 1 ] && [ "${QDMD_TEST_INSTALL:-0}" = 1 ] && [ "$(id -u)" -eq 0 ] &&
   ! dpkg-query -W gstreamer1.0-qdmd 2>/dev/null; then
-  export DEBIAN_FRONTEND=noninteractive
-  apt=(apt-get -q -y -o DPkg::Lock::Timeout=120)
-  "${apt[@]}" install --no-install-recommends "$plugin" "$scene"
-  status=0
-  "$tests/try_plugin.sh" "/$folder" || status=$?
-  env -u GST_PLUGIN_PATH -u GST_PLUGIN_PATH_1_0 -u GST_PLUGIN_SYSTEM_PATH_1_0 \
-    GST_REGISTRY_1_0="$work/registry.bin" gst-inspect-1.0 qdmdbackground >/dev/null || status=$?
-  "${apt[@]}" purge gstreamer1.0-qdmd gstreamer1.0-qdmd-scene
-  diff /dev/null <(find "/$folder" -name 'libgstqdmd*')
-  exit "$status"
+  "$tests/packages_test.sh" "$work"
 fi
