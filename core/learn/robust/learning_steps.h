@@ -21,7 +21,7 @@ namespace steps {
 namespace light {
 // Levels: cells that differ by less agree, a channel's mean.
 QDMD_STEP float kAgree = step("light.agree", 4.0f);
-// Levels: cells too dark or too bright have no ratio.
+// Levels: cells too dark or too bright have no ratio, and pixels so bright may be clipped.
 QDMD_STEP float kDark = step("light.dark", 8.0f), kBright = step("light.bright", 250.0f);
 // Levels: the mean of a cell whose samples are mostly at the end of their range, and say no more
 // than "at least"; brighter cells than the second may have such samples. Where so large a share of

@@ -153,6 +153,16 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
       gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
 }
 
+Gain without_tint(const Gain& gain) {
+  const float luma = luma_gain(gain);
+  float most = 0;
+  for (float of_channel : gain) most = std::max(most, std::abs(std::log(of_channel / luma)));
+  const float share = std::clamp(kOfColour * most / kStill - 1, 0.0f, 1.0f);
+  Gain found;
+  for (size_t c = 0; c < kChannels; ++c) found[c] = luma * std::pow(gain[c] / luma, share);
+  return found;
+}
+
 bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
   return brightness(gain) > kSwings &&
          share_at_end(CellPlanes(frames, frame).of, frames.cells()) > kEnds;

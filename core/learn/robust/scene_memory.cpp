@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/places.h"
 
@@ -273,8 +274,9 @@ bool SceneMemory::is_most_of_picture() const {
          kMostOfPicture * static_cast<double>(grid_.cells());
 }
 
-// A cloud is no look of its own: masks know the background in less light.
+// A cloud is no look of its own: masks know the background in less light, by its colours.
 void SceneMemory::leave_out_shaded(const float* const background[3]) {
+  if (colouring_of(background, grid_.cells()) == Colouring::none) return;
   std::erase_if(differing_, [&](int cell) {
     float look = 0, of_background = 0, rest = 0;
     for (int c = 0; c < kChannels; ++c) {
