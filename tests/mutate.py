@@ -45,7 +45,7 @@ TESTS = {
     'parallel': 'pool side_thread workers gram_slices',
     'base': 'clock engine',
     'library': 'engine',
-    'scene': 'scene scene_description scene_streams scene_objects scene_foliage scene_trees scene_ground scene_light scene_camera',
+    'scene': 'scene scene_description scene_streams scene_objects scene_foliage scene_trees scene_ground scene_light scene_exposure scene_camera',
     'metrics': 'metrics',
 }
 LAST = 'golden'  # where nobody near it has noticed

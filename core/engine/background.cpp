@@ -26,7 +26,8 @@ Background::Background(std::unique_ptr<Learner> learner, const LearnerRoom& room
       decision_(room.frames->width(), room.frames->height(), colours, steps, levels) {
   for (BackgroundModel& model : models_) {
     model.set_depth(room_.frames->depth());
-    model.set_samples({colours, levels}, levels.range());
+    const RgbColours rgb(colours, levels);
+    model.set_samples(rgb, rgb.range(levels));
   }
   learner_->begin(room_);
 }

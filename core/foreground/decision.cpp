@@ -296,10 +296,9 @@ void Decision::look() {
 // Where L is known from samples at the end of their range, it is at least so bright: what is
 // brighter in less light agrees.
 void Decision::raise_ends(size_t first, size_t count, uint8_t* const level[3]) const {
-  constexpr float kEnd = 253;
   const uint8_t* const x[3] = {now_.frame.x[0].high + first, now_.frame.x[1].high + first,
                                now_.frame.x[2].high + first};
-  rgb_.raise_ends(count, kEnd, now_.frame.model->shown_light(), x, level);
+  rgb_.raise_ends(count, constants().at_end, now_.frame.model->shown_light(), x, level);
 }
 
 // L, and which pixels differ from it.

@@ -49,6 +49,8 @@ struct DecisionConstants {
 
   // ---- Light ----
   LightRange light;
+  // Levels: a background so bright in unit light is at least that: its samples were clipped.
+  float at_end = 253;
 
   // ---- Specks ----
   // Parts of the mask below these shares of the picture are specks, and holes.

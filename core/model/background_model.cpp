@@ -205,7 +205,7 @@ void BackgroundModel::set_time(double t) {
   if (frozen_) {
     std::array<float, 9> weights = kIdentity;
     if (!gains_.empty()) {
-      const Gain gain = light(t);
+      const Gain gain = SampleLight(light(t), range_).gain;
       for (size_t c = 0; c < kChannels; ++c) weights[4 * c] = gain[c];
     }
     take_weights(weights.data(), weights.size());
@@ -214,7 +214,7 @@ void BackgroundModel::set_time(double t) {
   model_.weights(t / stride_, &time_weights_);
   if (steady_) use_steady_weights(t);
   if (!gains_.empty()) {
-    const Gain gain = light(t);
+    const Gain gain = SampleLight(light(t), range_).gain;
     for (size_t c = 0; c < gain.size(); ++c)
       time_weights_.row(static_cast<Eigen::Index>(c)) *= gain[c];
   }

@@ -40,7 +40,7 @@ void expand_bits(const uint8_t* bits, size_t count, uint8_t* HWY_RESTRICT keep,
 void take_row(const uint8_t* HWY_RESTRICT from, const uint8_t* HWY_RESTRICT keep, size_t count,
               const LevelMap& map, const uint8_t* next, uint8_t* HWY_RESTRICT out) {
   for (size_t i = 0; i < count; i += 64) hwy::Prefetch(next + i);
-  if (map.factor == 1) {
+  if (!map.changes()) {
     for (size_t i = 0; i < count; ++i) out[i] = from[i] & keep[i];
     return;
   }
@@ -56,7 +56,7 @@ void take_deep_row(const uint8_t* HWY_RESTRICT high, const uint8_t* HWY_RESTRICT
     hwy::Prefetch(next_high + i);
     hwy::Prefetch(next_low + i);
   }
-  if (map.factor == 1) {
+  if (!map.changes()) {
     for (size_t i = 0; i < count; ++i)
       out[i] = static_cast<uint16_t>((high[i] << low_bits | low[i]) & keep[i] * 257);
     return;
@@ -352,7 +352,7 @@ template class Filler<uint16_t>;
 void fill_samples(const ReferencePicture& reference, const uint8_t* bits, const KeptPicture& x,
                   const SampleLight& light, const uint8_t* reach, const SampledRows& rows,
                   uint8_t* const out[3]) {
-  const bool lit = is_lit(light.gain);
+  const bool lit = light.changes();
   SampleFinder samples(x, reference.width);
   size_t sample = 0;
   for (int row = rows.first; row < rows.end; row += rows.step) {

@@ -239,7 +239,7 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Sa
                uint8_t* bits, uint8_t* scratch) noexcept {
   const int height = reference.height;
   const auto width = static_cast<size_t>(reference.width);
-  const bool lit = is_lit(light.gain);
+  const bool lit = light.changes();
   const auto take = [&scratch](size_t bytes) { return std::exchange(scratch, scratch + bytes); };
   const size_t whole = whole_vectors(width);
   SumRing sums(reinterpret_cast<uint16_t*>(take(2 * whole * SumRing::kRows)), whole);
@@ -297,6 +297,8 @@ void find_mask(const ReferencePicture& reference, const KeptPicture& x, const Sa
 GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x,
                    const SampleLight& light, const SampledRows& rows, int bright) {
   int64_t product[kChannels] = {}, square[kChannels] = {}, fit = 0, seen = 0;
+  int tint[kChannels];
+  for (size_t c = 0; c < kChannels; ++c) tint[c] = static_cast<int>(std::lround(light.tint[c]));
   SampleFinder samples(x, reference.width);
   for (int row = rows.first; row < rows.end; row += rows.step) {
     samples.seek(row);
@@ -308,7 +310,7 @@ GainSums gain_sums(const ReferencePicture& reference, const KeptPicture& x,
       int own[kChannels], level[kChannels];  // above dark
       for (size_t c = 0; c < 3; ++c) {
         const int sample = samples.at(c, static_cast<size_t>(col));
-        own[c] = sample - light.range.dark[c];
+        own[c] = sample - light.range.dark[c] - tint[c];
         level[c] = reference.level[c][p] - light.range.dark[c];
         const float away =
             static_cast<float>(own[c]) - static_cast<float>(level[c]) * light.gain[c];
@@ -334,7 +336,9 @@ bool refine_gain(const GainSums& sums, Gain* gain, bool one_gain) {
   if (one_gain) {
     const auto product = static_cast<double>(sums[0] + sums[1] + sums[2]),
                square = static_cast<double>(sums[3] + sums[4] + sums[5]);
-    if (product > 0) gain->fill(static_cast<float>(product / square));
+    const auto more = static_cast<float>(product / square) / luma_gain(*gain);
+    if (product > 0)
+      for (float& of_channel : *gain) of_channel *= more;
     return true;
   }
   for (size_t c = 0; c < kChannels; ++c)

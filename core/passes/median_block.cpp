@@ -153,7 +153,7 @@ class BlockLayout {
       copy(frame, channel, across_, down_, few);
       spread(few, to);
     }
-    if (const LevelMap& map = frame.map[channel]; map.factor != 1)
+    if (const LevelMap& map = frame.map[channel]; map.changes())
       HWY_DYNAMIC_DISPATCH(scale_row)(end(channel) - begin(channel), map, to);
   }
   // Copies the samples that pixels share.

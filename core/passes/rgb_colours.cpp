@@ -34,6 +34,16 @@ RgbColours::RgbColours(Colours colours, const Levels& levels) : converts_(colour
       offset_[c] -= matrix_[c][k] * static_cast<float>(levels.black[k]);
 }
 
+SampleRange RgbColours::range(const Levels& levels) const {
+  constexpr float kMiddle = 110;  // R, G and B of a middle grey
+  SampleRange found = levels.range();
+  found.is_yuv = converts_;
+  if (!converts_) return found;
+  for (size_t c = 0; c < kChannels; ++c)
+    for (size_t k = 0; k < kChannels; ++k) found.tint[c][k] = kMiddle * back_[c][k];
+  return found;
+}
+
 void RgbColours::convert(size_t count, float* const samples[kChannels]) const {
   if (!converts_) return;
   for (size_t p = 0; p < count; ++p) {

@@ -38,6 +38,8 @@ class RgbColours {
       for (size_t k = 0; k < kChannels; ++k) out[c] += back_[c][k] * (rgb[k] - offset_[k]);
     return out;
   }
+  // What light may make of samples.
+  SampleRange range(const Levels& levels) const;
   // Rows of samples become R, G and B in place, within 0 .. 255.
   void convert(size_t count, float* const samples[kChannels]) const;
   // Rows of samples become what they are once R, G and B are at most 255.

@@ -1,6 +1,9 @@
 // What an effect is: its description, the stages of a frame in which it takes part, its needs.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <span>
@@ -34,13 +37,36 @@ enum Need : unsigned {
   kBuffers = 1 << 2,  // memory of its own, of the picture's size or for tables
 };
 
-// Light in a frame: factors of the levels.
+// Light that falls on a part of the frame: an ellipse around (x, y), in pixels of the frame.
+struct LocalLight {
+  double x, y, radius_x, radius_y;
+  double edge;      // share of the radius over which it fades, at the rim
+  double strength;  // of the light around it; it is added inside, below 0 taken away
+
+  // The factor of the light at a place.
+  double factor(double at_x, double at_y) const {
+    const double distance = std::hypot((at_x - x) / radius_x, (at_y - y) / radius_y);
+    const double inside = std::clamp((1 - distance) / edge, 0.0, 1.0);
+    return 1 + strength * inside * inside * (3 - 2 * inside);
+  }
+};
+
+// Light in a frame, and what the camera makes of it.
 struct Light {
-  std::array<double, 3> gain{1, 1, 1};
-  std::vector<double> rows;  // one factor a row of the frame; empty: the same light everywhere
+  std::array<double, 3> gain{1, 1, 1};  // factors of the light
+  std::vector<double> rows;       // one factor a row of the frame; empty: the same light everywhere
+  std::vector<LocalLight> local;  // light that falls on parts of the frame
+  double gamma = 1;               // exponent of the camera's curve; 1: levels are the light
+  double grey = 0;                // brightness of a picture without colour; 0: it has colours
 
   void scale(double factor) {
     for (auto& value : gain) value *= factor;
+  }
+  // Daylight; whatever sets rows does so in every frame.
+  void reset() {
+    gain = {1, 1, 1};
+    local.clear();
+    gamma = 1, grey = 0;
   }
 };
 

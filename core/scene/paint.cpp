@@ -66,10 +66,59 @@ void crop_turned_raster(const Raster<kSamples>& canvas, double left, double top,
 
 using Curve = std::array<uint8_t, 256>;
 
-Curve curve(double gain) {
+// What a camera's curve makes of a factor of the light: levels become `factor` times what they are,
+// and `offset` more.
+struct LevelChange {
+  double factor, offset;
+};
+
+LevelChange change_of(double gain, double gamma) {
+  if (gamma == 1) return {gain, 0};
+  const double factor = std::pow(gain, 1 / gamma);
+  return {factor, black_of_curve(gamma) * (factor - 1)};
+}
+
+Curve curve(double gain, double gamma) {
+  const LevelChange change = change_of(gain, gamma);
   Curve levels;
-  for (size_t i = 0; i < levels.size(); ++i) levels[i] = to_level(static_cast<double>(i) * gain);
+  for (size_t i = 0; i < levels.size(); ++i)
+    levels[i] = to_level(static_cast<double>(i) * change.factor + change.offset);
   return levels;
+}
+
+// The same for all pixels of a row, or of the picture.
+void apply_evenly(const Light& light, Picture* picture) {
+  std::array<Curve, 3> curves;
+  const auto set_curves = [&](double factor) {
+    for (size_t c = 0; c < 3; ++c)
+      curves[c] = c > 0 && light.gain[c] == light.gain[c - 1]
+                      ? curves[c - 1]
+                      : curve(light.gain[c] * factor, light.gamma);
+  };
+  set_curves(1);
+  for (int y = 0; y < picture->height; ++y) {
+    if (!light.rows.empty()) set_curves(light.rows[static_cast<size_t>(y)]);
+    uint8_t* row = picture->row(y);
+    for (int x = 0; x < picture->width; ++x, row += 3)
+      for (size_t c = 0; c < 3; ++c) row[c] = curves[c][row[c]];
+  }
+}
+
+void apply_by_pixel(const Light& light, Picture* picture) {
+  for (int y = 0; y < picture->height; ++y) {
+    const double of_row = light.rows.empty() ? 1 : light.rows[static_cast<size_t>(y)];
+    uint8_t* row = picture->row(y);
+    for (int x = 0; x < picture->width; ++x, row += 3) {
+      double factor = of_row;
+      for (const LocalLight& part : light.local) factor *= part.factor(x, y);
+      const bool white = light.gain[0] == light.gain[1] && light.gain[0] == light.gain[2];
+      LevelChange change{};
+      for (size_t c = 0; c < 3; ++c) {
+        if (c == 0 || !white) change = change_of(light.gain[c] * factor, light.gamma);
+        row[c] = to_level(row[c] * change.factor + change.offset);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -106,19 +155,31 @@ void crop_turned(const Plane& canvas, double left, double top, double turn, Plan
 }
 
 void apply(const Light& light, Picture* picture) {
-  std::array<Curve, 3> curves;
-  const auto set_curves = [&](double factor) {
-    for (size_t c = 0; c < 3; ++c)
-      curves[c] = c > 0 && light.gain[c] == light.gain[c - 1] ? curves[c - 1]
-                                                              : curve(light.gain[c] * factor);
-  };
-  set_curves(1);
-  for (int y = 0; y < picture->height; ++y) {
-    if (!light.rows.empty()) set_curves(light.rows[static_cast<size_t>(y)]);
-    uint8_t* row = picture->row(y);
-    for (int x = 0; x < picture->width; ++x, row += 3)
-      for (size_t c = 0; c < 3; ++c) row[c] = curves[c][row[c]];
-  }
+  if (light.local.empty())
+    apply_evenly(light, picture);
+  else
+    apply_by_pixel(light, picture);
+  if (light.grey > 0) take_colour(light.grey, picture);
+}
+
+void take_colour(double brightness, Picture* picture) {
+  uint8_t* end = picture->samples.data() + picture->samples.size();
+  for (uint8_t* pixel = picture->samples.data(); pixel != end; pixel += 3)
+    pixel[0] = pixel[1] = pixel[2] =
+        to_level((0.299 * pixel[0] + 0.587 * pixel[1] + 0.114 * pixel[2]) * brightness);
+}
+
+double mean_local_light(const Light& light, int width, int height) {
+  constexpr int kPlaces = 16;
+  double sum = 0;
+  for (int y = 0; y < kPlaces; ++y)
+    for (int x = 0; x < kPlaces; ++x) {
+      double factor = 1;
+      for (const LocalLight& part : light.local)
+        factor *= part.factor((x + 0.5) * width / kPlaces, (y + 0.5) * height / kPlaces);
+      sum += factor;
+    }
+  return sum / (kPlaces * kPlaces);
 }
 
 void to_labels(const Plane& shadow, Plane* coverage) {

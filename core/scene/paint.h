@@ -50,7 +50,17 @@ void crop(const Plane& canvas, double left, double top, Plane* frame);
 void crop_turned(const Picture& canvas, double left, double top, double turn, Picture* frame);
 void crop_turned(const Plane& canvas, double left, double top, double turn, Plane* frame);
 
+// Light is multiplied before the camera's curve: with an exponent g above 1, levels v are those of
+// the light ((v + b) / (255 + b))^g, b being black_of_curve(g). That is sRGB's curve for 2.4, above
+// the light in which it is a line. What is brighter than 255 is clipped.
 void apply(const Light& light, Picture* picture);
+// Levels by which the curve of that exponent lies below a power at black.
+inline double black_of_curve(double gamma) { return 0.055 * 255 * (gamma - 1) / 1.4; }
+// The mean factor of all local over a frame of that size, seen at 16 x 16 places.
+double mean_local_light(const Light& light, int width, int height);
+
+// Makes all channels of a pixel its luma (BT.601), times `brightness`.
+void take_colour(double brightness, Picture* picture);
 
 // kBackgroundLabel, kShadowLabel, kPartLabel or kObjectLabel in place of the coverage.
 void to_labels(const Plane& shadow, Plane* coverage);

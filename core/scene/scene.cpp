@@ -88,7 +88,8 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
 
 Scene::~Scene() = default;
 
-// The light that falls on the street and on whoever is in view.
+// The light that falls on the street and on whoever is in view; where it falls on a part of the
+// frame, levels are taken for those of all of it.
 double Scene::metered(double time) {
   Light light;
   for (const Effect* effect : stages_.light) effect->light(time, &light);
@@ -107,7 +108,7 @@ double Scene::metered(double time) {
   }
   double level = 0;
   for (size_t c = 0; c < 3; ++c) level += light.gain[c] * mean[c] / 3;
-  return level;
+  return light.local.empty() ? level : level * mean_local_light(light, frame.width, frame.height);
 }
 
 // Whoever is there, the farthest first.
@@ -238,8 +239,9 @@ void Scene::make(int64_t index, unsigned wanted) {
   for (Effect* effect : stages_.lens) effect->lens(state_);
   if (state_.margin > 0) crop_to_frame();
 
-  state_.light.gain = {1, 1, 1};
+  state_.light.reset();
   for (const Effect* effect : stages_.light) effect->light(state_.time, &state_.light);
+  for (LocalLight& part : state_.light.local) part.x -= state_.shift_x, part.y -= state_.shift_y;
   for (const Effect* effect : stages_.meter) effect->meter(state_.time, &state_.light);
   if (!stages_.light.empty() || !stages_.meter.empty()) {
     if (state_.wants(kFrame)) apply(state_.light, &state_.picture);

@@ -233,6 +233,60 @@ TEST(BackgroundModel, RoundsToNearestAndClamps) {
   }
 }
 
+// In more light, R, G and B of a background in Y, U and V end: pixel by pixel, in double.
+TEST(BackgroundModel, ColoursEndWhereTheSensorDoes) {
+  constexpr size_t kPixels = 900;
+  std::mt19937 rng(112);
+  const Clip clip = random_clip(kPixels, 1, rng);
+  const Window window = to_window(clip);
+  const Levels video = {{16, 128, 128}, {235, 128, 128}};
+  const RgbColours rgb(Colours::yuv, video);
+  const SampleRange range = rgb.range(video);
+  for (const Gain& gain : {Gain{1.4f, 1.4f, 1.4f}, {1.2f, 1, 0.8f}, {1.01f, 1.01f, 1.01f}}) {
+    BackgroundModel model;
+    model.set_samples(rgb, range);
+    model.build(window, scaled_snapshot(1));
+    model.set_light(gain);
+    model.set_time(0);
+    const auto levels = evaluate(model, kPixels);
+    std::vector<uint16_t> deep(3 * kPixels);
+    for (size_t first = 0; first < kPixels; first += kMaxRun) {
+      uint16_t* const rows[3] = {&deep[first], &deep[kPixels + first], &deep[2 * kPixels + first]};
+      model.evaluate_deep(first, std::min(kMaxRun, kPixels - first), rows);
+    }
+    const SampleLight light(gain, range);
+    size_t clipped = 0;
+    for (size_t p = 0; p < kPixels; ++p) {
+      double sample[3], of_rgb[3];
+      for (size_t c = 0; c < 3; ++c) {
+        const double dark = range.dark[c];
+        sample[c] = static_cast<double>(light.gain[c]) * (clip.at(0, c, p) - dark) + dark +
+                    static_cast<double>(light.tint[c]);
+      }
+      bool ends = false;
+      for (size_t c = 0; c < 3; ++c) {
+        of_rgb[c] = static_cast<double>(rgb.offset()[c]);
+        for (size_t k = 0; k < 3; ++k)
+          of_rgb[c] += static_cast<double>(rgb.matrix()[c][k]) * sample[k];
+        ends |= of_rgb[c] > 255;
+        of_rgb[c] = std::min(of_rgb[c], 255.0);
+      }
+      clipped += ends;
+      const auto back = rgb.sample({static_cast<float>(of_rgb[0]), static_cast<float>(of_rgb[1]),
+                                    static_cast<float>(of_rgb[2])});
+      for (size_t c = 0; c < 3; ++c) {
+        const double expected =
+            std::clamp(ends ? static_cast<double>(back[c]) : sample[c], 0.0, 255.0);
+        // Half a level of rounding; single precision, and six digits of the standard's matrices.
+        ASSERT_NEAR(levels[c * kPixels + p], expected, 0.5 + 2e-3) << p << ' ' << ends;
+        ASSERT_EQ(deep[c * kPixels + p], levels[c * kPixels + p]);
+      }
+    }
+    EXPECT_GT(clipped, kPixels / 10);
+    EXPECT_LT(clipped, kPixels);
+  }
+}
+
 TEST(BackgroundModel, WithoutModesIsBlack) {
   std::mt19937 rng(106);
   const Window window = to_window(random_clip(50, 3, rng));

@@ -163,6 +163,35 @@ TEST(SampleLights, LeaveWhatIsDark) {
   EXPECT_EQ(full.range().dark, (std::array<uint8_t, 3>{0, 128, 128}));
 }
 
+// White balance in Y, U and V: exact for a middle grey.
+TEST(SampleLights, TintWhatIsGrey) {
+  const RgbColours video(Colours::yuv, kVideo);
+  const Gain warm = {1.15f, 1, 0.85f};
+  const SampleLight light(warm, video.range(kVideo));
+  const auto grey = yuv_of(110, 110, 110), seen = yuv_of(1.15f * 110, 110, 0.85f * 110);
+  for (size_t c = 0; c < 3; ++c) {
+    const uint8_t now = in_light(byte_of(grey[c]), light.into(c));
+    EXPECT_NEAR(now, seen[c], 1.5) << c;
+    EXPECT_NEAR(out_of_light(now, light, c), grey[c], 1.5) << c;
+  }
+  EXPECT_TRUE(light.changes());
+  // Without colours of its own, light is one gain.
+  const SampleLight white({1.3f, 1.3f, 1.3f}, video.range(kVideo));
+  EXPECT_EQ(white.tint, (std::array<float, 3>{}));
+  EXPECT_EQ(white.gain, (Gain{1.3f, 1.3f, 1.3f}));
+  EXPECT_FALSE(SampleLight(kSameLight, video.range(kVideo)).changes());
+  // R, G and B have gains of their own.
+  EXPECT_EQ(SampleLight(warm, RgbColours().range({})).gain, warm);
+}
+
+// Colours of light that change little are noise.
+TEST(SampleLights, SmallTintsAreNone) {
+  const Gain little = without_tint({1.03f, 1, 0.97f}), much = without_tint({1.15f, 1, 0.85f});
+  for (const float of_channel : little) EXPECT_NEAR(of_channel, luma_gain({1.03f, 1, 0.97f}), 1e-6);
+  EXPECT_NEAR(much[0], 1.15f, 0.01);
+  EXPECT_NEAR(much[2], 0.85f, 0.01);
+}
+
 // ---- Colours ----
 
 TEST(Grey, IsToldByTheContent) {
@@ -262,37 +291,47 @@ constexpr int kWidth = 160, kHeight = 120, kFrames = 420;
 
 struct Camera {
   const char* name;
-  // A sample of channel c in that frame; luma: of its pixel.
-  std::function<float(int frame, float sample, float luma)> shows;
+  // A sample of a channel in that frame; luma: of its pixel.
+  std::function<float(int frame, size_t channel, float sample, float luma)> shows;
   int counts_from;
 };
 
+float swing(int t) { return std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100); }
+
 const Camera kCameras[] = {
     {"clip",
-     [](int t, float sample, float) {
+     [](int t, size_t, float sample, float) {
        return sample * 1.15f *
               (1 + 0.2f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100));
      },
      100},
     {"glare",
-     [](int t, float sample, float) {
+     [](int t, size_t, float sample, float) {
        return sample * 1.7f *
               (1 + 0.25f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100));
      },
      100},
     {"start",
-     [](int t, float sample, float) {
+     [](int t, size_t, float sample, float) {
        return sample * (t < 50    ? 0.06f
                         : t < 125 ? 2.2f - 1.2f * static_cast<float>(t - 50) / 75
                                   : 1.0f);
      },
      150},
-    {"infrared", [](int t, float sample, float luma) { return t < 200 ? sample : 1.15f * luma; },
-     100},
+    {"infrared",
+     [](int t, size_t, float sample, float luma) { return t < 200 ? sample : 1.15f * luma; }, 100},
     {"night and day",
-     [](int t, float sample, float luma) { return t < 150 || t >= 280 ? sample : 1.15f * luma; },
+     [](int t, size_t, float sample, float luma) {
+       return t < 150 || t >= 280 ? sample : 1.15f * luma;
+     },
      100},
-    {"grey", [](int, float, float luma) { return luma; }, 100},
+    {"grey", [](int, size_t, float, float luma) { return luma; }, 100},
+    {"white balance",
+     [](int t, size_t c, float sample, float) {
+       const float shift = 0.15f * swing(t);
+       return sample * (c == 0 ? 1 + shift : c == 2 ? 1 - shift : 1);
+     },
+     100},
 };
 
 // F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
@@ -330,7 +369,8 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
       const float luma =
           0.299f * samples[3 * p] + 0.587f * samples[3 * p + 1] + 0.114f * samples[3 * p + 2];
       std::array<float, 3> shown;
-      for (size_t c = 0; c < 3; ++c) shown[c] = byte_of(camera.shows(t, samples[3 * p + c], luma));
+      for (size_t c = 0; c < 3; ++c)
+        shown[c] = byte_of(camera.shows(t, c, samples[3 * p + c], luma));
       if (options.colours == Colours::yuv) shown = yuv_of(shown[0], shown[1], shown[2]);
       for (size_t c = 0; c < 3; ++c) planes[c * kWidth * kHeight + p] = byte_of(shown[c]);
       is_foreground.push_back(scene.labels().samples[p] > 127);

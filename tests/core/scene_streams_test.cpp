@@ -231,7 +231,11 @@ constexpr const char* kNothing[] = {"low-rate=4",
                                     "lost-blocks=0",
                                     "smear:seconds=0",
                                     "frozen:seconds=0",
-                                    "lost-signal:seconds=0"};
+                                    "lost-signal:seconds=0",
+                                    "lamp=0",
+                                    "headlights=0",
+                                    "cloud=0",
+                                    "infrared:seconds=0"};
 
 void expect_no_change(const std::string& nothing, const std::string& name) {
   // Two effects of one name are one.

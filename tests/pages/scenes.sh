@@ -23,6 +23,9 @@ frame_of() {
     fade) echo 180 ;;
     light-switch | illumination-changes) echo 135 ;;
     exposure) echo 100 ;;
+    lamp) echo 130 ;;
+    headlights) echo 90 ;;
+    cloud | infrared) echo 170 ;;
     *) echo 60 ;;
   esac
 }

@@ -21,7 +21,7 @@ namespace steps {
 namespace light {
 // Levels: cells that differ by less agree, a channel's mean.
 QDMD_STEP float kAgree = step("light.agree", 4.0f);
-// Levels: cells too dark or too bright have no ratio.
+// Levels: cells too dark or too bright have no ratio, and pixels so bright may be clipped.
 QDMD_STEP float kDark = step("light.dark", 8.0f), kBright = step("light.bright", 250.0f);
 // Levels: the mean of a cell whose samples are mostly at the end of their range, and say no more
 // than "at least"; brighter cells than the second may have such samples. Where so large a share of
@@ -49,6 +49,8 @@ QDMD_STEP float kGrowth = step("light.growth", 1.3f), kShare = step("light.share
 QDMD_STEP float kLeastGain = step("light.least_gain", 0.01f);
 // Relative change of light that needs no following: less is a part of the noise.
 QDMD_STEP float kStill = step("light.still", 0.03f);
+// What a change of its colours counts in that.
+QDMD_STEP float kOfColour = step("light.of_colour", 0.5f);
 // Light that is followed from frame to frame must make this share of the cells agree, and this
 // share more; where so large a share agrees, nothing is followed.
 QDMD_STEP float kLeastFollowed = step("light.least_followed", 0.25f);
@@ -191,6 +193,10 @@ QDMD_STEP double kWentOn = step("proofs.went_on", 0.85);
 // A share of the picture that no object covers at once; and the frames that it must last for.
 QDMD_STEP double kMostOfPicture = step("proofs.most_of_picture", 1.0 / 3);
 QDMD_STEP int64_t kLasts = step("proofs.lasts", int64_t{75});
+// Where so much of it differs, what is no darker than this share of the background, of the same
+// colour within so many levels, sum of the channels, is in a shadow: a cloud's.
+QDMD_STEP float kDarkestShade = step("proofs.darkest_shade", 0.5f);
+QDMD_STEP float kShadeRest = step("proofs.shade_rest", 12.0f);
 // Frames: a scene is young for so long (mode=live).
 QDMD_STEP int64_t kYoungFrames = step("proofs.young_frames", int64_t{200});
 }  // namespace proofs

@@ -49,9 +49,8 @@ float share_at_end(const float* const frame[3], size_t cells) {
 }
 
 // The ratio that most cells share: the mode of the ratios' logarithms, refined by medians near it.
-// 1 without a look at these, where that mode is nearer to 1 than `still`, a logarithm.
 Gain shared_gain(const float* const frame[3], const float* const reference[3], size_t cells,
-                 LightScratch* scratch, float still = 0) {
+                 LightScratch* scratch) {
   constexpr int kBins = 300;
   constexpr float kLowest = -3;
   std::array<int, kBins + 4> histogram{};
@@ -81,7 +80,6 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
     if (smooth > most) most = smooth, best = bin;
   }
   const float mode = kLowest + (static_cast<float>(best) + 0.5f) * kBin;
-  if (std::abs(mode) < still) return kSameLight;
   Gain gain = kSameLight;
   auto& near = scratch->near;
   for (size_t c = 0; c < kChannels; ++c) {
@@ -106,20 +104,30 @@ struct CellPlanes {
 };
 
 Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
-               LightScratch* scratch, float still = 0) {
+               LightScratch* scratch) {
   const float before = agreement(frame.of, background.of, cells, kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
-  const Gain gain = shared_gain(frame.of, background.of, cells, scratch, still);
+  const Gain gain = shared_gain(frame.of, background.of, cells, scratch);
   const float after = agreement(frame.of, background.of, cells, gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
 }
 
 float brightness(const Gain& gain) { return (gain[0] + gain[1] + gain[2]) / 3; }
 
+// How far a light is from another one, a logarithm: of brightness, or of colours (white balance),
+// which are measured less well.
+float change(const Gain& gain, const Gain& from = kSameLight) {
+  const float brighter = std::log(brightness(gain) / brightness(from));
+  float most = std::abs(brighter);
+  for (size_t c = 0; c < kChannels; ++c)
+    most = std::max(most, kOfColour * std::abs(std::log(gain[c] / from[c]) - brighter));
+  return most;
+}
+
 // 1 for small changes, with a soft edge.
 Gain without_noise(const Gain& gain) {
-  const float share = std::clamp(std::abs(std::log(brightness(gain))) / kStill - 1, 0.0f, 1.0f);
+  const float share = std::clamp(change(gain) / kStill - 1, 0.0f, 1.0f);
   if (share == 0) return kSameLight;
   Gain settled = gain;
   for (float& g : settled) g = std::exp(std::log(g) * share);
@@ -130,9 +138,18 @@ Gain without_noise(const Gain& gain) {
 
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch) {
-  // without_noise() takes so little for none.
   return without_noise(
-      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch, kBin));
+      gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
+}
+
+Gain without_tint(const Gain& gain) {
+  const float luma = luma_gain(gain);
+  float most = 0;
+  for (float of_channel : gain) most = std::max(most, std::abs(std::log(of_channel / luma)));
+  const float share = std::clamp(kOfColour * most / kStill - 1, 0.0f, 1.0f);
+  Gain found;
+  for (size_t c = 0; c < kChannels; ++c) found[c] = luma * std::pow(gain[c] / luma, share);
+  return found;
 }
 
 bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
@@ -142,7 +159,7 @@ bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
 
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                    const Gain& before, const Gain& after) {
-  if (std::abs(std::log(brightness(after) / brightness(before))) < kStill) {
+  if (change(after, before) < kStill) {
     Gain middle = before;
     for (size_t c = 0; c < kChannels; ++c) middle[c] = std::sqrt(before[c] * after[c]);
     return middle;
@@ -168,7 +185,7 @@ std::vector<size_t> darkest(const std::vector<Gain>& gains) {
   return found;
 }
 
-bool changes(const Gain& gain) { return std::abs(std::log(brightness(gain))) > kStill; }
+bool changes(const Gain& gain) { return change(gain) > kStill; }
 
 // Frames 0 .. count - 1 of some pictures, compared by the threads of a pool.
 class FramesOfLight {
@@ -343,17 +360,20 @@ uint64_t light_of_bytes(const Grid& grid, int threads) {
 }
 
 void settle_light(std::vector<Gain>* gains) {
-  std::vector<float> logs;
-  for (const Gain& gain : *gains) logs.push_back(std::log(brightness(gain)));
-  std::vector<float> sorted = logs;
-  const float main = median(&sorted);
+  Gain main = kSameLight;
+  std::vector<float> levels;
+  for (size_t c = 0; c < kChannels; ++c) {
+    levels.clear();
+    for (const Gain& gain : *gains) levels.push_back(gain[c]);
+    main[c] = median(&levels);
+  }
   std::vector<size_t> near;
-  for (size_t t = 0; t < logs.size(); ++t)
-    if (std::abs(logs[t] - main) < kStill) near.push_back(t);
-  if (2 * near.size() < logs.size()) return;
+  for (size_t t = 0; t < gains->size(); ++t)
+    if (change((*gains)[t], main) < kStill) near.push_back(t);
+  if (2 * near.size() < gains->size()) return;
   Gain common = kSameLight;
   for (size_t c = 0; c < kChannels; ++c) {
-    std::vector<float> levels;
+    levels.clear();
     for (size_t t : near) levels.push_back((*gains)[t][c]);
     common[c] = median(&levels);
   }

@@ -102,6 +102,9 @@ inline std::array<float, kChannels> unclipped(const std::array<float, kChannels>
   return found;
 }
 
+// The light without a small change of its colours, with a soft edge.
+Gain without_tint(const Gain& gain);
+
 // Sets changes within 3 % of the light of most frames to 1, with a soft edge; all gains become
 // relative to that light. Does nothing where no light is that of half of the frames.
 void settle_light(std::vector<Gain>* gains);

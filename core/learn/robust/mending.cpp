@@ -152,6 +152,7 @@ void FrameFollower::replace_deep(const std::vector<int>& cells, const LitFrames&
   const SnapshotRange& frames = lit.frames;
   const size_t count = static_cast<size_t>(frames.size()), half = count / 2;
   const double unit = 1.0 / (1 << bits_below(frames.depth()));
+  const SampleRange range = context_.range();
   for (int cell : cells) {
     const int row = cell / context_.grid.cols, col = cell % context_.grid.cols;
     for (int y = context_.grid.top(row); y < context_.grid.top(row + 1); ++y)
@@ -163,7 +164,7 @@ void FrameFollower::replace_deep(const std::vector<int>& cells, const LitFrames&
           // In order: there are a few.
           double samples[Learner::kMendingFrames];
           for (int t = 0; t < frames.size(); ++t) {
-            const SampleLight light(lit.at[static_cast<size_t>(t)].light, context_.range());
+            const SampleLight light(lit.at[static_cast<size_t>(t)].light, range);
             const auto channel = static_cast<size_t>(c);
             const double sample =
                 read_sample(frames, t, c, p) / static_cast<double>(light.gain[channel]) +

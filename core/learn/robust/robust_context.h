@@ -3,6 +3,7 @@
 
 #include "core/learn/learner.h"
 #include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/light.h"
 #include "core/passes/grid.h"
 #include "core/passes/mask.h"
 #include "core/passes/sampling.h"
@@ -31,18 +32,17 @@ struct RobustContext {
     const FrameContents of = contents();
     return {grid.width, grid.height, of.chroma_columns, of.chroma_rows};
   }
-  // Light is a gain of R, G and B: of Y, U and V it is the same one, that of brightness.
+  // Of Y, U and V one gain is refined, that of luma.
   bool one_gain() const { return options.colours == Colours::yuv; }
-  Gain of_format(Gain gain) const {
-    if (one_gain()) gain.fill(0.299f * gain[0] + 0.587f * gain[1] + 0.114f * gain[2]);
-    return gain;
-  }
+  // Light as samples can show it: colours of Y, U and V that change little are those of noise.
+  Gain of_format(const Gain& gain) const { return one_gain() ? without_tint(gain) : gain; }
   // What light may make of samples.
-  SampleRange range() const { return options.levels.range(); }
+  SampleRange range() const { return rgb.range(options.levels); }
   // Samples from here on may be at the end of their range. Chroma has no such end: black.
   int end_of_range(size_t channel) const {
     const Levels& of = options.levels;
-    return of.black[channel] + (of.white[channel] - of.black[channel]) * 250 / 255;
+    const auto range = static_cast<float>(of.white[channel] - of.black[channel]);
+    return of.black[channel] + static_cast<int>(range * steps::light::kBright / 255);
   }
   // The cells of a picture's planes.
   void find_cells(const uint8_t* const plane[kChannels], GridFrames* cells, int frame) const {

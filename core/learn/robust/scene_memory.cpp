@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/places.h"
 
@@ -242,7 +243,11 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
         return looks_.newest() - looks_.since(at) < StandingLooks::kNewsFrames;
       }));
   news_ = news >= StandingLooks::kLeastNews;
-  if (judge_as_one()) return found_;
+  if (is_most_of_picture()) leave_out_shaded(background);
+  if (is_most_of_picture()) {
+    judge_as_one();
+    return found_;
+  }
   // What was judged stays so as long as it is there.
   std::fill(unjudged_.begin(), unjudged_.end(), uint8_t{0});
   for (int at : differing_) {
@@ -264,11 +269,31 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
   return found_;
 }
 
+bool SceneMemory::is_most_of_picture() const {
+  return static_cast<double>(differing_.size()) >=
+         kMostOfPicture * static_cast<double>(grid_.cells());
+}
+
+// A cloud is no look of its own: masks know the background in less light, by its colours.
+void SceneMemory::leave_out_shaded(const float* const background[3]) {
+  if (colouring_of(background, grid_.cells()) == Colouring::none) return;
+  std::erase_if(differing_, [&](int cell) {
+    float look = 0, of_background = 0, rest = 0;
+    for (int c = 0; c < kChannels; ++c) {
+      look += looks_.level(cell, c);
+      of_background += background[c][static_cast<size_t>(cell)];
+    }
+    const float shade = look / std::max(of_background, 1.0f);
+    if (shade < kDarkestShade || shade >= 1) return false;
+    for (int c = 0; c < kChannels; ++c)
+      rest += std::abs(looks_.level(cell, c) - shade * background[c][static_cast<size_t>(cell)]);
+    return rest < kShadeRest;
+  });
+}
+
 // No object changes so much of the picture: the camera was moved, or something disturbs it. What
 // lasts is background.
-bool SceneMemory::judge_as_one() {
-  if (kMostOfPicture * static_cast<double>(grid_.cells()) > static_cast<double>(differing_.size()))
-    return false;
+void SceneMemory::judge_as_one() {
   for (int at : differing_) {
     const auto cell = static_cast<size_t>(at);
     if (looks_.newest() - looks_.since(at) < kLasts) continue;
@@ -278,7 +303,6 @@ bool SceneMemory::judge_as_one() {
       uncovered_.add(at, since_[cell]);
     }
   }
-  return true;
 }
 
 float SceneMemory::apart(int cell, const float* const background[3]) const {

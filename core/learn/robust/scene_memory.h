@@ -44,6 +44,7 @@ struct Proofs {
 // | looks came all over the picture at once, and nothing went there    | nothing, for kLasts     |
 // | most of the picture differs                                        | nothing, for kLasts;    |
 // |                                                                    |   then left: no object  |
+// | there, the background in less light                                | shaded: older look stays|
 // | anything else, for 3 kMoves frames                                 | came: older look stays  |
 // | the scene is young (mode=live)                                     | contours alone decide   |
 class SceneMemory {
@@ -108,7 +109,9 @@ class SceneMemory {
   bool is_all_over(int64_t since) const;
   bool left_beside(const std::vector<int>& region) const;
   void widen(const float* const background[3]);
-  bool judge_as_one();
+  void leave_out_shaded(const float* const background[3]);
+  bool is_most_of_picture() const;
+  void judge_as_one();
   float apart(int cell, const float* const background[3]) const;
   template <typename What>
   void each_near(int cell, int reach, const What& what) const;

@@ -139,16 +139,15 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
 // Takes out what the background would show at the end of the samples' range: such a sample says
 // only that it is at least so bright.
 void WindowSolve::fill_ends(int snapshot, uint8_t* bits) const {
-  constexpr float kEnd = 250;
   const Gain& gain = gains_[static_cast<size_t>(snapshot)];
   if (!is_lit(gain)) return;
   const auto take_out = [&](const uint8_t* level, float of) {
-    const auto least = static_cast<int>(std::ceil(kEnd / of));
+    const auto least = static_cast<int>(std::ceil(steps::light::kBright / of));
     if (of <= 1 || least > 255) return;
     for (size_t p = 0; p < context_.pixels(); ++p)
       bits[p / 8] = static_cast<uint8_t>(bits[p / 8] | (level[p] >= least) << (p % 8));
   };
-  if (!brightest_.empty()) return take_out(brightest_.data(), gain[0]);
+  if (!brightest_.empty()) return take_out(brightest_.data(), luma_gain(gain));
   for (size_t c = 0; c < kChannels; ++c) take_out(reference_.level[c].data(), gain[c]);
 }
 

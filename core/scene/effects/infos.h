@@ -7,8 +7,9 @@ namespace qdmd::scene {
 
 extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kStand, kLeave,
     kClutter, kBootstrap, kFoliage, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror,
-    kMotionBlur, kRain, kSnow, kFog, kDefocus, kJitter, kFade, kLightSwitch, kNight, kBands,
-    kExposure, kFocusSearch, kNoise, kCompression, kLostBlocks, kSmear, kLostSignal, kFrozen;
+    kMotionBlur, kRain, kSnow, kFog, kDefocus, kJitter, kFade, kLightSwitch, kLamp, kHeadlights,
+    kCloud, kNight, kBands, kExposure, kFocusSearch, kNoise, kInfrared, kCompression, kLostBlocks,
+    kSmear, kLostSignal, kFrozen;
 
 // For EffectInfo::make.
 template <typename Class>
