@@ -3,7 +3,7 @@
 # nothing when all are there.
 #
 #   tests/install-dependencies.sh GROUP...      groups: build, test, package, demo, docs, opencv,
-#                                               fuzz, tidy, coverage, neon, python, root, lint
+#                                               fuzz, tidy, coverage, python, root, lint
 set -euo pipefail
 
 build=(g++ meson ninja-build pkg-config libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev
@@ -33,8 +33,6 @@ opencv=(python3-numpy python3-opencv)
 fuzz=(clang)
 tidy=(clang-tidy)
 coverage=(clang llvm)
-# The compiler for 64-bit ARM, its C library, and what runs its programs.
-neon=(make g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
 # What makes the roots of tests/root.sh, and what looks at packages.
 root=(mmdebstrap debian-archive-keyring)
 lint=(lintian)
@@ -51,11 +49,10 @@ for group in "$@"; do
     fuzz) wanted+=("${fuzz[@]}") ;;
     tidy) wanted+=("${tidy[@]}") ;;
     coverage) wanted+=("${coverage[@]}") ;;
-    neon) wanted+=("${neon[@]}") ;;
     python) wanted+=("${python[@]}") ;;
     root) wanted+=("${root[@]}") ;;
     lint) wanted+=("${lint[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, neon, python, root, lint)" >&2; exit 2 ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, python, root, lint)" >&2; exit 2 ;;
   esac
 done
 
