@@ -202,7 +202,7 @@ TEST(Limits, AFolderThatCannotHaveTheWindowIsAnErrorThatSaysWhy) {
   EXPECT_NE(std::string::npos, text.find("/no/such/folder")) << text;
   EXPECT_EQ("", first_word("videotestsrc num-buffers=30 ! "
                            "video/x-raw,format=RGB,width=64,height=48 ! qdmdbackground "
-                           "window-size=8 window-on-disk=/tmp max-memory=2000000 ! fakesink",
+                           "window-size=8 window-on-disk=/tmp ! fakesink",
                            &domain, &code));
 }
 
