@@ -115,5 +115,5 @@ slow=Kernels.RowsThatAreTheLastColumns:Kernels.BlackAndWhiteOfAllSizes
 flags="-std=c++20 -O1 -g1 -I. $(pkg-config --cflags eigen3 libhwy | sed 's/-I/-isystem /g')"
 short thread threads core/parallel/{pool,side_thread,workers}.cpp tests/core/{pool,side_thread,workers}_test.cpp
 short address,undefined kernels core/gram/{tile_kernel,kernel,gram,block_sums,shared_chroma}.cpp core/planes/plane_slots.cpp \
-  core/base/large_vector.cpp core/passes/{chroma,combine,digits,fill,median_rows,planes,read_samples,residual,window_mask}.cpp core/parallel/pool.cpp \
+  core/base/{large_vector,page_file}.cpp core/passes/{agreement,chroma,combine,digits,fill,median_rows,planes,read_samples,residual,window_mask}.cpp core/parallel/pool.cpp \
   tests/core/{gram,kernel,passes,chroma,digits,combine,shared_chroma}_test.cpp
