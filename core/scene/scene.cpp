@@ -88,7 +88,7 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
 
 Scene::~Scene() = default;
 
-// The light that falls on the street and on whoever is in view; where it falls on a part of the
+// The light that falls on the street and on people in view; where it falls on a part of the
 // frame, levels are taken for those of all of it.
 double Scene::metered(double time) {
   Light light;

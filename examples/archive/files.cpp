@@ -69,7 +69,7 @@ std::optional<LockedFile> LockedFile::take(const std::string& path) {
   if (file < 0) throw std::runtime_error(path + " cannot be written: " + std::strerror(errno));
   LockedFile locked(file);
   if (flock(file, LOCK_EX | LOCK_NB) == 0) {
-    // Whoever had it may have removed it.
+    // The process that had it may have removed it.
     struct stat here, there;
     if (fstat(file, &here) != 0 || stat(path.c_str(), &there) != 0 || here.st_ino != there.st_ino)
       return std::nullopt;

@@ -251,7 +251,7 @@ class Job {
       line_.show(share(), folder_.frames_done(plan_.stretches.size()), plan_.frames);
   }
 
-  // By whoever comes first; the others have nothing to do.
+  // By the process that comes first; the others have nothing to do.
   void join() {
     const auto held = folder_.hold_to_join();
     if (!held) return;

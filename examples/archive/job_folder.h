@@ -18,8 +18,8 @@ struct StretchFacts {
   double seconds = 0, processor_seconds = 0, most_memory = 0;
 };
 
-// The plan; and for each stretch a file that whoever works on it has locked, and one that says that
-// it is whole. A process that dies loses its lock, and others do its stretch. All throw
+// The plan; and for each stretch a file that the process at work on it has locked, and one that
+// says that it is whole. A process that dies loses its lock, and others do its stretch. All throw
 // std::runtime_error.
 class JobFolder {
  public:
@@ -41,7 +41,7 @@ class JobFolder {
   // Frames that were written of so many stretches, those included that are under way.
   int64_t frames_done(size_t stretches);
 
-  // What another job has left goes, by whoever holds the folder.
+  // What another job has left goes. For the process that holds the folder.
   void clear();
   // All of it goes.
   void remove() const;

@@ -59,7 +59,7 @@ Ranks ranks_of_environment() {
 bool is_child() {
   const char* const parent = variable(kChild);
   if (!parent) return false;
-  // Nobody goes on where whoever shares the work out is gone.
+  // Nobody goes on where the process that shares the work out is gone.
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != std::atoi(parent)) std::_Exit(1);
   return true;
