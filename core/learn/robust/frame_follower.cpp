@@ -19,7 +19,7 @@ void FrameFollower::begin() {
   const Models models = context_.room.models;
   background_cells_ = GridFrames(grid, 2);
   unclipped_ = GridFrames(grid, 1);
-  light_scratch_ = LightScratch(grid.cells());
+  light_ = LightOfFrames(grid.cells());
   // Frames that wait can wait for a proof.
   if (context_.follows(models))
     memory_ = SceneMemory(grid, models == Models::two_of_live ? steps::proofs::kYoungFrames : 0);
@@ -30,13 +30,14 @@ void FrameFollower::begin() {
 
 uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
   const Grid& grid = context.grid;
-  return GridFrames::bytes(grid, 3) + LightScratch::bytes(grid.cells()) +
+  return GridFrames::bytes(grid, 3) + LightOfFrames::bytes(grid.cells()) +
          (context.follows(models) ? SceneMemory::bytes(grid) : 0) +
          (models == Models::two_of_live ? 0 : StandingLooks::bytes(grid)) +
          HistoryStarts::bytes(grid.cells()) + SceneWatch::bytes(grid);
 }
 
 void FrameFollower::forget() {
+  light_.forget();
   looks_.forget();
   memory_.forget();
   disturbances_.forget();
@@ -55,6 +56,7 @@ void FrameFollower::publish(bool whole) {
   // Not while the solve runs: frames that come beside it mend what it would be compared with.
   calm_ = whole && is_calm() ? calm_ + 1 : 0;
   published_ = 1 - published_;
+  light_.forget();
   if (!std::exchange(scene_begins_, false)) return;
   colours_begin_ = false;
   looks_.forget();
@@ -166,6 +168,7 @@ void FrameFollower::read(const LearntEarlier& from) {
 void FrameFollower::follow(const std::vector<uint8_t> level[kChannels]) {
   const uint8_t* const planes[kChannels] = {level[0].data(), level[1].data(), level[2].data()};
   context_.find_cells(planes, &background_cells_, published_);
+  light_.forget();
 }
 
 }  // namespace qdmd

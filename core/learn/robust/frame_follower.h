@@ -59,8 +59,8 @@ class FrameFollower {
   // are others; null: nobody knows.
   const ColourMap* new_colours() const { return new_colours_ ? &*new_colours_ : nullptr; }
   Gain light(int slot) {
-    return context_.of_format(light_over(context_.room.frames->cells(), slot, background_cells_,
-                                         published_, &light_scratch_));
+    return context_.of_format(
+        light_.over(context_.room.frames->cells(), slot, background_cells_, published_));
   }
 
  private:
@@ -108,7 +108,7 @@ class FrameFollower {
   GridFrames background_cells_;
   GridFrames unclipped_;  // of a frame
   int published_ = 0;
-  LightScratch light_scratch_;
+  LightOfFrames light_;
   SceneMemory memory_;  // what frames that came showed
   Disturbances disturbances_;
   StandingLooks looks_;  // what frames showed when they were compared, in batch

@@ -52,7 +52,8 @@ QDMD_STEP float kStill = step("light.still", 0.03f);
 // What a change of its colours counts in that.
 QDMD_STEP float kOfColour = step("light.of_colour", 0.5f);
 // Light that is followed from frame to frame must make this share of the cells agree, and this
-// share more; where so large a share agrees, nothing is followed.
+// share more (or less: then it is looked for anew); where so large a share agrees, nothing is
+// followed.
 QDMD_STEP float kLeastFollowed = step("light.least_followed", 0.25f);
 QDMD_STEP float kFollowed = step("light.followed", 0.05f);
 QDMD_STEP float kAllAgree = step("light.all_agree", 0.9f);

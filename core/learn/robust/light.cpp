@@ -103,14 +103,20 @@ struct CellPlanes {
       : of{frames.plane(frame, 0), frames.plane(frame, 1), frames.plane(frame, 2)} {}
 };
 
-Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
+// before: the share that agrees in the same light.
+Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells, float before,
                LightScratch* scratch) {
-  const float before = agreement(frame.of, background.of, cells, kSameLight);
   // What agrees needs no other light, and cannot gain enough.
   if (kGrowth * before + kShare >= 1) return kSameLight;
   const Gain gain = shared_gain(frame.of, background.of, cells, scratch);
   const float after = agreement(frame.of, background.of, cells, gain);
   return after > kGrowth * before + kShare ? gain : kSameLight;
+}
+
+Gain gain_over(const CellPlanes& frame, const CellPlanes& background, size_t cells,
+               LightScratch* scratch) {
+  return gain_over(frame, background, cells, agreement(frame.of, background.of, cells, kSameLight),
+                   scratch);
 }
 
 float brightness(const Gain& gain) { return (gain[0] + gain[1] + gain[2]) / 3; }
@@ -140,6 +146,20 @@ Gain light_over(const GridFrames& frames, int frame, const GridFrames& backgroun
                 LightScratch* scratch) {
   return without_noise(
       gain_over({frames, frame}, {background, reference}, frames.cells(), scratch));
+}
+
+Gain LightOfFrames::over(const GridFrames& frames, int frame, const GridFrames& background,
+                         int reference) {
+  const CellPlanes shown(frames, frame), of_background(background, reference);
+  const size_t cells = frames.cells();
+  const float before = agreement(shown.of, of_background.of, cells, kSameLight);
+  if (before > agreed_ - kFollowed) {
+    agreed_ = std::max(agreed_, before);
+    return kSameLight;
+  }
+  const Gain gain = without_noise(gain_over(shown, of_background, cells, before, &scratch_));
+  agreed_ = is_lit(gain) ? kUnknown : before;
+  return gain;
 }
 
 Gain without_tint(const Gain& gain) {

@@ -53,6 +53,27 @@ class LightScratch {
 Gain light_over(const GridFrames& frames, int frame, const GridFrames& background, int reference,
                 LightScratch* scratch);
 
+// The light of frames, one after another, over one background.
+class LightOfFrames {
+ public:
+  LightOfFrames() = default;
+  explicit LightOfFrames(size_t cells) : scratch_(cells) {}
+  static uint64_t bytes(uint64_t cells) { return LightScratch::bytes(cells); }
+
+  // Another background.
+  void forget() { agreed_ = kUnknown; }
+  // As light_over(), whose result it is for the first frame. A frame that agrees with the
+  // background as well as those before it did, for which no other light was found, is in their
+  // light.
+  Gain over(const GridFrames& frames, int frame, const GridFrames& background, int reference);
+
+ private:
+  static constexpr float kUnknown = 2;  // no share is as large
+
+  LightScratch scratch_;
+  float agreed_ = kUnknown;  // the most that has agreed in the same light; kUnknown: in no frame
+};
+
 // The gain of one frame over picture `reference` of `background`, where the frames before and after
 // it have the gains `before` and `after`: between them, or, where the light changed by more than a
 // little, one of them.

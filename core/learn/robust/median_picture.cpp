@@ -1,6 +1,7 @@
 #include "core/learn/robust/median_picture.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "core/passes/median_block.h"
 
@@ -9,6 +10,15 @@ namespace qdmd {
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
                     uint8_t* spread, const SampleRange& range) {
+  std::vector<MedianFrame> prepared(frames.size());
+  for (size_t i = 0; i < frames.size(); ++i) {
+    MedianFrame& at = prepared[i];
+    at.is_shared = frames[i].shape.is_shared();
+    for (size_t c = 0; c < kChannels; ++c)
+      at.stride[c] =
+          static_cast<size_t>(c > 0 && at.is_shared ? frames[i].shape.chroma_width() : grid.width);
+    at.take_out({frames[i].gain, range});
+  }
   // A row of cells a part.
   pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
     const int row = static_cast<int>(part);
@@ -21,16 +31,10 @@ void median_picture(const Grid& grid, const StableFrames& stable,
       MedianFrame at[kMedianFrames];
       ChromaShape shape;
       for (size_t i = 0; i < count; ++i) {
-        const LitPicture& frame =
-            frames[static_cast<size_t>(shown[(2 * i + 1) * known / (2 * count)])];
-        pictures[i] = &frame;
-        at[i].is_shared = frame.shape.is_shared();
-        if (at[i].is_shared) shape = frame.shape;
-        for (size_t c = 0; c < kChannels; ++c) {
-          at[i].stride[c] = static_cast<size_t>(
-              c > 0 && at[i].is_shared ? frame.shape.chroma_width() : grid.width);
-        }
-        at[i].take_out({frame.gain, range});
+        const auto frame = static_cast<size_t>(shown[(2 * i + 1) * known / (2 * count)]);
+        pictures[i] = &frames[frame];
+        at[i] = prepared[frame];
+        if (at[i].is_shared) shape = pictures[i]->shape;
       }
       const int left = grid.left(col), right = grid.left(col + 1);
       const int most = std::min(kMedianBlock, right - left), tall = kMedianBlock / most;

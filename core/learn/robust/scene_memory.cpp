@@ -194,34 +194,42 @@ bool SceneMemory::is_all_over(int64_t since) const {
   return 2 * std::count(tiles.begin(), tiles.end(), true) >= std::ssize(tiles);
 }
 
+// stronger: the background's contour, more than kStronger.
+bool SceneMemory::has_left(const std::vector<int>& region, const Change& change, double stronger,
+                           const Motion& motion) const {
+  const double both =
+      stronger + (change.known ? kOfMotion * balance(motion.after, motion.before, 0.1) : 0);
+  // What comes beside what stands there is mostly a part of it.
+  if (motion.near < kSettled) return both > (came_beside(region) ? kMuchStronger : kStronger);
+  const bool is_clear = region.size() >= kClearRegion && stronger > kClear && both > kClearBoth;
+  return stronger > kMuchStronger && both > kMuchStronger &&
+         (looks_.newest() - change.until >= 2 * kMoves || is_clear);
+}
+
 void SceneMemory::judge(const std::vector<int>& region, const Contours& contours) {
   if (region.size() < kLeastRegion) {
     if (left_beside(region) && !came_beside(region)) decide(region, Of::left);
     return;
   }
   const Change change = change_of(region);
-  const Motion motion = motion_around(region, change);
+  const int64_t stood = looks_.newest() - change.until;
   const RegionContours contour = contours(region);
   const bool says = contour.pairs >= kLeastPairs && contour.open <= contour.pairs &&
                     contour.background >= kLeastContour;
   const double stronger =
       says ? balance(static_cast<double>(contour.background), static_cast<double>(contour.look), 1)
            : 0;
-  const double went_on = change.known ? balance(motion.after, motion.before, 0.1) : 0;
-  const int64_t stood = looks_.newest() - change.until;
-  const bool settled = motion.near < kSettled;
-  // What comes beside what stands there is mostly a part of it.
-  const double least = came_beside(region) ? kMuchStronger : kStronger;
-  const bool is_clear = region.size() >= kClearRegion && stronger > kClear &&
-                        stronger + kOfMotion * went_on > kClearBoth;
-  const bool left = settled ? stronger > kStronger && stronger + kOfMotion * went_on > least
-                            : stronger > kMuchStronger &&
-                                  stronger + kOfMotion * went_on > kMuchStronger &&
-                                  (stood >= 2 * kMoves || is_clear);
-  // A picture that is out of focus has weak contours all over, and nothing went there.
-  const bool disturbed = motion.after < kWentOn && stood < kLasts && is_all_over(change.until);
-  if (left && !disturbed) return decide(region, Of::left);
-  if (stood >= 3 * kMoves && !left) decide(region, Of::came);
+  // Motion changes nothing where contours do not say that something left.
+  if (stronger > kStronger) {
+    const Motion motion = motion_around(region, change);
+    if (has_left(region, change, stronger, motion)) {
+      // A picture that is out of focus has weak contours all over, and nothing went there.
+      const bool disturbed = motion.after < kWentOn && stood < kLasts && is_all_over(change.until);
+      if (!disturbed) decide(region, Of::left);
+      return;
+    }
+  }
+  if (stood >= 3 * kMoves) decide(region, Of::came);
 }
 
 const std::vector<int>& SceneMemory::judge(const float* const background[3],

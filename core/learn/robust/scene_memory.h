@@ -103,6 +103,8 @@ class SceneMemory {
   };
   Change change_of(const std::vector<int>& region) const;
   Motion motion_around(const std::vector<int>& region, const Change& change);
+  bool has_left(const std::vector<int>& region, const Change& change, double stronger,
+                const Motion& motion) const;
   void judge(const std::vector<int>& region, const Contours& contours);
   void decide(const std::vector<int>& region, Of of);
   bool came_beside(const std::vector<int>& region) const;

@@ -14,6 +14,19 @@ namespace {
 
 using namespace steps::start;
 
+// differs[cell]: differs_at(), but for cells that keep what they have. Without branches: the
+// compiler makes vectors of it.
+void find_differing(const float* const a[3], const float* const b[3], const uint8_t* keeps,
+                    size_t cells, uint8_t* __restrict differs) {
+  const float *a_0 = a[0], *a_1 = a[1], *a_2 = a[2], *b_0 = b[0], *b_1 = b[1], *b_2 = b[2];
+  const float most = kChannels * kLooksDiffer;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    const float apart = std::abs(a_0[cell] - b_0[cell]) + std::abs(a_1[cell] - b_1[cell]) +
+                        std::abs(a_2[cell] - b_2[cell]);
+    differs[cell] = static_cast<uint8_t>(static_cast<int>(apart > most) & (keeps[cell] ^ 1));
+  }
+}
+
 // Frames propose themselves for the regions where they differ from the background: what has the
 // weaker contour there is the background. Something that stood still for most of the window ends at
 // a contour that the true background does not have. known: cells whose earlier background stays,
@@ -31,21 +44,21 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
   const int proposals = std::min(count, kProposals);
   const int looks = static_cast<int>(density.size() / cells);
   // The last look is the earlier background, if any cell is known.
-  const auto keeps = [&](size_t cell) {
-    if (!known[cell]) return false;
+  std::vector<uint8_t> keeps(cells);
+  const auto note_kept = [&](size_t cell) {
+    if (!known[cell]) return;
     const float* const e[3] = {frames.plane(count, 0), frames.plane(count, 1),
                                frames.plane(count, 2)};
-    return !differs_at(b, e, cell);
+    keeps[cell] = !differs_at(b, e, cell);
   };
+  for (size_t cell = 0; cell < cells; ++cell) note_kept(cell);
   for (int sweep = 0; sweep < 2; ++sweep) {
     bool changed = false;
     for (int i = 0; i < proposals + looks - count; ++i) {
       const int t =
           i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
       const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-      for (size_t cell = 0; cell < cells; ++cell) {
-        differs[cell] = differs_at(f, b, cell) && !keeps(cell);
-      }
+      find_differing(f, b, keeps.data(), cells, differs.data());
       const auto& found = regions.find(differs);
       for (size_t region = 0; region < found.size(); ++region) {
         const std::vector<int>& inside = found[region];
@@ -60,6 +73,7 @@ void compare_contours(const Grid& grid, const GridPictures& frames, int count,
           if (!counts(static_cast<size_t>(cell), t)) continue;
           (*from)[static_cast<size_t>(cell)] = t;
           background.take(frames, t, static_cast<size_t>(cell));
+          note_kept(static_cast<size_t>(cell));
         }
         changed = true;
       }
@@ -192,10 +206,16 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
     if (first_looks.from.empty()) return true;
     return t == count ? first_looks.earlier_counts[cell] != 0 : t >= first_looks.from[cell];
   };
+  const auto counts_all = [&](size_t cell) {
+    return first_looks.from.empty() ||
+           (first_looks.from[cell] == 0 && first_looks.earlier_counts[cell] != 0);
+  };
   if (!first_looks.from.empty())
-    for (int t = 0; t < looks; ++t)
-      for (size_t cell = 0; cell < cells; ++cell)
+    for (size_t cell = 0; cell < cells; ++cell) {
+      if (counts_all(cell)) continue;
+      for (int t = 0; t < looks; ++t)
         if (!counts(cell, t)) density[static_cast<size_t>(t) * cells + cell] = 0;
+    }
   std::vector<int> from = densest(density, cells, pool);
   // What was absorbed is the background of a part of the frames only.
   if (!first_looks.absorbed) leave_clutter_out(grid, frames, count, density, &from, pool, room);
@@ -231,7 +251,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
       if (earlier && (from[cell] == count || from[cell] < earlier->older_frames))
         limit = std::min(limit, earlier->limit[cell]);
       result.limit[cell] = limit;
-      if (first_looks.from.empty())
+      if (counts_all(cell))
         result.of_cell.take(cell, [&](size_t t) { return of_cell[t] <= limit; });
       else
         result.of_cell.take(cell, [&](size_t t) {
