@@ -45,7 +45,7 @@ long() {
     -Dtests=enabled -Dscene=disabled -Dwerror=false
   case "$kind" in
     thread) names=(pool side_thread workers decision band gram_slices live live_schedule absorb waiting_frames another_scene) ;;
-    *) names=(engine kernel passes grid chroma digits picture combine gram gram_slices robust_fill median_picture robust_parts pool side_thread workers resample) ;;
+    *) names=(engine kernel passes grid chroma digits picture combine gram gram_slices robust_fill median_picture light_of robust_parts pool side_thread workers resample) ;;
   esac
   for name in "${names[@]}"; do targets+=("tests/core/${name}_test"); done
   for name in features live separate faults; do targets+=("tests/gst/element-$name-test"); done

@@ -83,4 +83,15 @@ inline std::vector<uint8_t> temporal_median(const Clip& clip) {
   return median;
 }
 
+// Cells of any levels.
+inline GridFrames random_frames(const Grid& grid, int count, float low, float high,
+                                std::mt19937& rng) {
+  GridFrames frames(grid, count);
+  std::uniform_real_distribution<float> level(low, high);
+  for (int t = 0; t < count; ++t)
+    for (int c = 0; c < kChannels; ++c)
+      for (size_t i = 0; i < grid.cells(); ++i) frames.plane(t, c)[i] = level(rng);
+  return frames;
+}
+
 }  // namespace qdmd::test
