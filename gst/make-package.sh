@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the Debian packages with `dpkg-buildpackage -b -us -uc`, some minutes of compiling: the plugins, the
 # library and its headers, the module for Python, and the tools.
 #

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
