@@ -44,6 +44,7 @@ build_for_tests() {
 }
 [ "$*" = arm64-packages ] || take_tree
 for part in "$@"; do
+  root=$suite
   echo "== $suite: $part"
   case "$part" in
     commands)
