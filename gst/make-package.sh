@@ -22,7 +22,12 @@ fi
 folder=$(realpath -m "${1:-$(dirname "$0")/../build/package}")
 cd "$(dirname "$0")/.."
 
-# Always the same folder: ccache then knows what it has compiled.
+# Always the same folder, and the cache of this user, not of the home that debhelper makes: ccache then knows what it has
+# compiled.
+if command -v ccache >/dev/null; then
+  CCACHE_DIR=$(ccache --get-config cache_dir)
+  export CCACHE_DIR
+fi
 work=$PWD/build/package-work
 rm -rf "$work"
 trap 'rm -rf "$work"' EXIT
