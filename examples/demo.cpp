@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Separates a video and shows the result: a side-by-side video, the background, a contact sheet.
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the project and separates a video: a street scene, or the one that is named.
 #
 #   examples/demo.sh [VIDEO]

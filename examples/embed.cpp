@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // An application around the element: it feeds frames or plays a file, reads the element's messages,
 // changes what is sent on while it plays, and keeps the background as a picture.
 //

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Records a camera while something moves before it, and the seconds before that.
 
 The element tells after each solve how much of the picture is foreground; that opens and closes a

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Records what happens before a camera: a film of each motion, and a line for each event.
 
 While something moves, and for the seconds before, three films are written: the frames, the empty

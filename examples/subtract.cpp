@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Reads a video or pictures ("folder/%04d.png") and writes its background and the last mask.
 //
 //   g++ -std=c++17 subtract.cpp $(pkg-config --cflags --libs qdmd opencv4)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // An application that reads two pictures of each frame: the background, and the mask beside it as
 // grey levels. It prints how much of each frame is foreground, and how bright what is behind it is.
 //

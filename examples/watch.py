@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints where something moves in a video, frame by frame, and keeps the empty scene as a picture.
 
 Needs python3-gi and gir1.2-gst-plugins-base-1.0, and GST_PLUGIN_PATH where the plugin is not

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The things of a frame as GStreamer's own analytics metadata, which elements of others read
 // (GStreamer 1.24 and later; built only where its library is found).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The property `background`: a picture that is made when somebody asks for it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Rectangles as users write them, and as buffers carry them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What qdmdbackground and qdmdseparate do alike around their frames: properties, signals, start,
 // events, latency.
 #pragma once

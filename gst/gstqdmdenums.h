@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The enumerations of qdmdbackground's properties, with the texts that gst-inspect shows.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames of an element on their way through the engine, with their metadata.
 #pragma once
 

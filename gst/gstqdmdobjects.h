@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The things of an element's stream: regions with numbers on its buffers, and messages about them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A source pad of qdmdseparate: which pictures it sends, in which caps, out of which buffers.
 #pragma once
 

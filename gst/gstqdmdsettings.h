@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an application asks of qdmdbackground, as GObject properties.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an element keeps from one call to the next, and what the two elements do differently.
 #pragma once
 

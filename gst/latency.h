@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How long a frame waits in qdmdbackground: what it answers a LATENCY query.
 #pragma once
 

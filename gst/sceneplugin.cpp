@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Registers the scene source, in a plugin of its own: qdmdbackground does without its libraries.
 #include <gst/gst.h>
 

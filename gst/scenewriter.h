@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Writes what a scene has made into packed RGB frames of the same size.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Writes R, G and B of a scene as Y, U and V, or grey, of whatever depth, range and matrix.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What timestamps say: whether frames are missing, or time has jumped.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Tells the core what a video format's samples are.
 #pragma once
 

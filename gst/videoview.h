@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Shows a mapped GstVideoFrame to the core as an ImageView.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames that wait in an element, and the events that came between them.
 #pragma once
 

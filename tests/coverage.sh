@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Which lines of core/ and gst/ the suite runs, with clang's counters, in a folder of its own: half an
 # hour to compile, and twice the time of the suite. Prints a table of files and, of each, the lines
 # that are not run; build-coverage/coverage.txt keeps both.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs the fuzz targets of tests/fuzz with clang's libFuzzer, and its address and undefined
 # behaviour sanitizers, in a folder of their own. What it finds is left there as crash-*: mend it, and
 # move the file to tests/fuzz/cases/TARGET, from where the normal suite runs it again.
@@ -20,7 +21,7 @@ targets=("$@")
 [ "$#" -gt 0 ] || targets=(scene learnt dataset core element)
 for target in "${targets[@]}"; do
   if [ ! -f "tests/fuzz/${target}_fuzz.cpp" ]; then
-    sed -n '2,/^set/s/^# \?//p' "$0" >&2
+    sed -n '3,/^set/s/^# \?//p' "$0" >&2
     exit 2
   fi
 done

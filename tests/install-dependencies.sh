@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs the Debian packages that are missing, as root or through sudo. Asks no network and prints
 # nothing when all are there.
 #
@@ -33,8 +34,9 @@ opencv=(python3-numpy python3-opencv)
 fuzz=(clang)
 tidy=(clang-tidy)
 coverage=(clang llvm)
-# What makes the roots of tests/root.sh, and what looks at packages.
+# What makes the roots of tests/root.sh, and those for another processor, and what looks at packages.
 root=(mmdebstrap debian-archive-keyring)
+foreign=(qemu-user-static arch-test dpkg-dev)
 lint=(lintian)
 
 wanted=()
@@ -51,8 +53,9 @@ for group in "$@"; do
     coverage) wanted+=("${coverage[@]}") ;;
     python) wanted+=("${python[@]}") ;;
     root) wanted+=("${root[@]}") ;;
+    foreign) wanted+=("${foreign[@]}") ;;
     lint) wanted+=("${lint[@]}") ;;
-    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, python, root, lint)" >&2; exit 2 ;;
+    *) echo "unknown group of packages: $group (build, test, package, demo, docs, opencv, fuzz, tidy, coverage, python, root, foreign, lint)" >&2; exit 2 ;;
   esac
 done
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Prints how many compilers may run at once: one for each core, and 2 GB of free memory for each, since
 # Eigen's largest files take that much.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """From an lcov record on standard input: of each file the lines that no test ran, as ranges."""
 
 import pathlib

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes FOLDER hold links to those of GStreamer's own plugins that are named, and nothing else:
 #
 #   tests/link-plugins.sh FOLDER PLUGINS NAME...

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Whether the suite notices small mistakes: makes one at a time in core/, in a copy of the tree.
 
   tests/mutate.py [--count 40] [--seed 1] [--jobs 2] [--only REGEX] [--missed LOG]

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs a command in a Debian of its own, such as Debian 13 on Debian 12, as root or through sudo:
 #
-#   tests/root.sh NAME COMMAND...     NAME is a suite of Debian, `trixie`, or one with an ending, `trixie-arm64`
+#   tests/root.sh NAME COMMAND...     NAME is a suite of Debian, `trixie`, or one with an ending, `trixie-arm64`;
+#                                     with the ending `-on-arm64`, its programs are for that processor, and
+#                                     QEMU runs them, slowly
 #   tests/root.sh --path NAME         prints where it is
 #   tests/root.sh --tree NAME         puts the last commit into /root/gst-qdmd there, as `meson dist` gives it
 #
@@ -36,6 +38,8 @@ name=$1
 shift
 suite=${name%%-*}
 root=$(path_of "$name")
+arch=$(dpkg --print-architecture)
+[[ $name != *-on-* ]] || arch=${name##*-on-}
 
 make_root() {
   local mirror option options=()
@@ -51,13 +55,22 @@ make_root() {
   rm -rf "$root.part"
   mkdir -p "$(dirname "$root")"
   echo "Making a root of $suite in $root"
-  if ! mmdebstrap --mode=root --variant=minbase "${options[@]}" "$suite" "$root.part" "$mirror" \
+  if ! mmdebstrap --mode=root --variant=minbase --architectures="$arch" "${options[@]}" "$suite" "$root.part" "$mirror" \
     >"$root.log" 2>&1; then
     tail -n 20 "$root.log" >&2
     exit 1
   fi
   mv "$root.part" "$root"
 }
+# The kernel has QEMU run programs for another processor. Where systemd does not run, nobody has told it.
+run_foreign() {
+  local cpu known=/proc/sys/fs/binfmt_misc
+  tests/install-dependencies.sh foreign
+  cpu=$(dpkg-architecture -qDEB_HOST_GNU_CPU -a"$arch" 2>/dev/null)
+  [ -e "$known/register" ] || mount -t binfmt_misc none "$known"
+  [ -e "$known/qemu-$cpu" ] || tr -d '\n' <"/usr/lib/binfmt.d/qemu-$cpu.conf" >"$known/register"
+}
+[ "$arch" = "$(dpkg --print-architecture)" ] || run_foreign
 if [ ! -d "$root" ]; then
   tests/install-dependencies.sh root
   make_root

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what is missing, builds, checks the formatting and runs every test, and the short form of
 # the sanitizers.
 #
@@ -12,7 +13,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-usage() { sed -n '2,/^set/s/^# \?//p' tests/run.sh; }
+usage() { sed -n '3,/^set/s/^# \?//p' tests/run.sh; }
 fast=no
 if [ "$#" -gt 1 ]; then
   echo "tests/run.sh takes one flag at most, and was given $#: see tests/run.sh --help." >&2

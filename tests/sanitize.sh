@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs tests with the compiler's sanitizers, in folders of their own.
 #
 #   tests/sanitize.sh                     the short form, a minute with its compiling: kernels with
@@ -106,7 +107,7 @@ elif [ "${1:-}" = --long ]; then
   for kind in "$@"; do long "$kind"; done
   exit
 elif [ "$#" -gt 0 ]; then
-  sed -n '2,/^set/s/^# \?//p' "$0" >&2
+  sed -n '3,/^set/s/^# \?//p' "$0" >&2
   exit 2
 fi
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs clang-tidy, with the checks of .clang-tidy, over sources as the build folder compiles them.
 #
 #   tests/tidy.sh                 all of core/ and gst/: most of an hour, because of Eigen

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pixels of a picture by which its place is found in other pictures.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How a camera has moved between a picture of its scene and a frame.
 #pragma once
 

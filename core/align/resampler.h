@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pictures from one pose to another, by the threads that there are.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // From the canvas back to where a frame's camera looked.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Follows a camera that shakes: the pose of each frame of a stream.
 #pragma once
 

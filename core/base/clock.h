@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was spent where: seconds of each kind of work, whichever thread did it.
 #pragma once
 

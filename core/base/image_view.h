@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A view of a picture whose memory belongs to others.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Vectors of many megabytes, in large pages.
 #pragma once
 

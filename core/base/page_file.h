@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Memory that lies in a file, for what is larger than the machine's memory.
 #pragma once
 

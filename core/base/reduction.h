@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How much smaller than its frames a picture is that masks are found in.
 #pragma once
 

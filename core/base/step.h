@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Constants that shape results, and builds in which they can be set from outside.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Exact DMD of one colour channel (the paper's Algorithm 1), from its Gram matrix.
 #pragma once
 

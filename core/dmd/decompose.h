@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One call from a window and its Gram matrix to L(t).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/dmd/error_bound.h"
 
 #include "core/dmd/estimator.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How far rounding, and data that move by half a level, can move a background.
 #pragma once
 

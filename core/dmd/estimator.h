@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Decompositions that noise does not bend, from the same factor as the paper's.
 #pragma once
 

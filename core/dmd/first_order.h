@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How the one background mode of a solve moves when what it was made of moves, to first order.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Inverses and square roots of small quaternion matrices.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What all decompositions share: choosing the background modes and fitting their amplitudes.
 // Templates on the real type, so that tests can run the same algorithm in 50 digits.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a decomposition is asked for, and what it reports.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD (the paper's Algorithm 2), one function for each way to it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD (the paper's Algorithm 2) of a snapshot factor: the small problem after the pixels.
 #pragma once
 

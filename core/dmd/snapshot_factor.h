@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A small matrix that stands for the snapshots: all that Q-DMD asks of the pixels' geometry.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD by the solver that is asked for, by a more careful one where that cannot, with bounds.
 #include <cmath>
 #include <optional>

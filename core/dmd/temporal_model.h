@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // L(t) as a real linear combination of the window's planes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The background that frames are compared with, and the one in the making.
 #pragma once
 

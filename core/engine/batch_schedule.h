@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One frame leaves for each that comes, against its own window's model.
 #pragma once
 

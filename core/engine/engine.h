@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The background separator: frames in, pictures out. No GStreamer.
 #pragma once
 

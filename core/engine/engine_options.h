@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an engine is asked for when it begins.
 #pragma once
 

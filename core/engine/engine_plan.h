@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an engine's options and a size of frames come to, and why they are refused.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The frame that leaves next: its pictures, its mask, and where its camera looked.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When the live mode works on what: frame numbers only, no pixels.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Each frame leaves at once, against the newest model.
 #pragma once
 

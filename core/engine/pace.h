@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which stretches of frames are solved, so that frames keep to the time that they may take.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When the background learns from frames, and when frames may leave: batch and live differ in this.
 #pragma once
 

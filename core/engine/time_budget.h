@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How much work a background gets, so that a frame takes no longer than the user allows.
 #pragma once
 

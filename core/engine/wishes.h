@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a caller may wish anew with each frame.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which pixels of a stream's frames are foreground.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The steps of a decision, and the constants that they go by. Users have no say in either:
 // docs/notebook/masks.md has what each step is worth, and what other constants would give.
 #pragma once

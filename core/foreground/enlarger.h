@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pictures of the frames' own size, of what was found in a smaller one.
 #pragma once
 

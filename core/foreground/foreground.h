@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Foreground statistics of a solved window.
 #pragma once
 

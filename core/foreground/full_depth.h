@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples of more than 8 bits against the background: all of their bits.
 #pragma once
 

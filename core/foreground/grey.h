@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Whether a picture has colours: what infra-red cameras send as R, G and B, or as Y, U and V, has
 // none.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Loops over runs of a mask's samples, 255 or 0.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Where the background moves by itself: leaves, water, edges before a camera that shakes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Parts that are found by links: each element names another one of its part, and one of them
 // itself. It stands for the part.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The four pictures that users can ask for, in frames of any layout.
 #pragma once
 

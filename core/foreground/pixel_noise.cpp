@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/foreground/pixel_noise.h"
 
 #include <algorithm>

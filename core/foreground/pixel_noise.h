@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How far each pixel is from the background while it is background.
 #pragma once
 

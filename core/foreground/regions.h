@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Boxes around what moves, from a mask.
 #pragma once
 

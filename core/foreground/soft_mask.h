@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A mask whose edge follows the picture's, and is steady from frame to frame.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Specks and holes of a mask: parts that are too small to be anything.
 #pragma once
 

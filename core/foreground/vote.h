@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The pixels of a mask overrule those that differ from what is around them.
 #pragma once
 

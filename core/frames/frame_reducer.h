@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames as a smaller picture that masks are found in.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A window's frames, with all that belongs to a frame.
 #pragma once
 

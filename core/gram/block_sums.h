@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Sums of the pixels that share a chroma sample, as two 8-bit digits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The exact Gram matrix of a window, and the quaternion and per-channel matrices inside it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Exact inner products of 8-bit planes: the one place where the Gram matrix touches pixels.
 #pragma once
 

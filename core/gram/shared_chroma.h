@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Inner products of frames whose chroma samples are shared by pixels, without spreading them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Inner products by register tiles, for each vector instruction set.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD and exact DMD of a window, from its exact Gram matrix.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How a window's background is found, and what that is asked for.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Places where frames showed that something has left which belonged to the background.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine with the interface of OpenCV's background subtractors. Needs OpenCV's headers.
 #pragma once
 

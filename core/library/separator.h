@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine without GStreamer: pictures in, backgrounds and masks out.
 #pragma once
 

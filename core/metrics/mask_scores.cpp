@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/metrics/mask_scores.h"
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Precision, recall and F-measure of foreground masks.
 #pragma once
 

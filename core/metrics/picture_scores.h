@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The six measures by which the field compares background pictures.
 //
 // Definitions: L. Maddalena and A. Petrosino, "Towards benchmarking scene background

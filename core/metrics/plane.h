@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One channel of numbers, and the channels that the measures of a background picture look at.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A model's pictures from frames whose pixels share samples of chroma.
 #pragma once
 

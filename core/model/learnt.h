@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was learnt of a scene's background, to go on with later.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was learnt, as the bytes of a file.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Who goes with whom: the cheapest pairs of two sets.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Things that come, stand and go: what is known of one, and what is told of it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What becomes of one thing: it appears, stops, moves on and is gone, from its boxes alone.
 #pragma once
 

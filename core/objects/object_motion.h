@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Where a thing is, how large it is and how it moves: what its regions say of that.
 #pragma once
 

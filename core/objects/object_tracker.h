@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Follows things through the regions of masks, and tells what becomes of them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was taken away from the background, gathered from the places that were uncovered.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Threads that wait for work, shared by all passes over pixels.
 #pragma once
 

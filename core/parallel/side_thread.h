@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One piece of work that goes on while its caller does something else.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How many cells of two pictures agree: what tells one light of a scene from another.
 #pragma once
 

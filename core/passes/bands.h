@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How a pass over pixels is divided: among threads, and over time.
 #pragma once
 

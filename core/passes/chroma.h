@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Rows whose samples several pixels share, or lie between those of other channels.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Linear combinations of planes: the frames' into pictures of modes, the pictures' into L(t).
 #pragma once
 

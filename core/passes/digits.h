@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples of more than 8 bits: as the two digits that frames are kept in, as numbers, and as the
 // words of video in memory.
 #pragma once

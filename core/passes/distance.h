@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How far a frame's pixels are from the background's: at the same place, and around it.
 #pragma once
 

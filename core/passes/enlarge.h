@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Rows of a larger picture from those of a smaller one.
 #pragma once
 

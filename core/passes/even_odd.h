@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Bytes as sums of 16 bits: those at even places and those at odd ones. Lanes never move, which
 // would take longer than the sums.
 // After simd.h, once for each instruction set: no include guard.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Takes the foreground out of a window: what is no background becomes background.
 #pragma once
 

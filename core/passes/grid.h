@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pictures on a coarse grid: means over cells, on which regions are compared.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A pixel of a mask is overruled where most of those around it are the other, row by row.
 #pragma once
 

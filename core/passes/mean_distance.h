@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Mean distances of pixels, and limits that follow from them, in one pass over a row.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The median of some frames at a block of pixels, and how far they lie from it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which samples to compare so that the middle ones come to their places, whatever they are: many
 // pixels take the same steps side by side.
 #pragma once

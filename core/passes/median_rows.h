@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The median of rows of levels, sample by sample.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How alike the patches around a cell are in different frames.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Packed pixels to planes and back: the streaming passes at both ends of the engine.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames in which pixels share samples, read as if each pixel had its own.
 #pragma once
 

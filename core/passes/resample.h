@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A plane of samples seen from a little beside.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What frames and background differ in, in one pass over bytes.
 #pragma once
 

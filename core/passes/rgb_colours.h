@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // R, G and B of samples, whatever the colours of frames are.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every k-th pixel in x and y of a picture.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which pixels of a frame are the background in another light: shadows, and floors that shine.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Highway, for a file that is compiled once for each instruction set. No include guard: each time
 // includes it again. Before it:
 //     #undef HWY_TARGET_INCLUDE

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The soft edge of a mask: a guided filter, and what fades with it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples under another light: the one rounding that all passes share.
 #pragma once
 

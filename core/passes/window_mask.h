@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The masks of a window's snapshots, of which only what is set takes memory.
 #pragma once
 

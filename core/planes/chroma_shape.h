@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which pixels of a picture share samples of chroma.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The planes of a picture, as frames are kept.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Memory for the planes of many pictures of one size.
 #pragma once
 

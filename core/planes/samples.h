@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples of 8 to 16 bits as frames are kept in: their highest eight bits, and the bits below.
 #pragma once
 

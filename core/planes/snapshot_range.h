@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Some of a window's snapshots, in time order.
 #pragma once
 

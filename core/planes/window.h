@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The window of frames: a ring of pictures.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Arnoldi's method for the dominant eigenvalues of a quaternion operator.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The templates of this folder in double, but for svd.h, compiled once: Eigen's templates in them
 // take seconds in each file that uses them.
 #include "core/quaternion/factorize.h"

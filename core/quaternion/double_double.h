@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Numbers of about 32 decimal digits as unevaluated sums of two doubles.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // QR and Cholesky factorizations of quaternion matrices, and triangular solves.
 #pragma once
 

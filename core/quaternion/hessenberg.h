@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Hessenberg form of quaternion matrices, and linear systems with Hessenberg matrices.
 #pragma once
 

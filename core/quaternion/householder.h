@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Quaternion Householder reflectors H = I - tau v v^H, tau real.
 #pragma once
 

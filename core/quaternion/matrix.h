@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Quaternion matrices as A + B j on two complex Eigen matrices.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The eigenvalue of a Hessenberg pencil that is nearest to one, with both eigenvectors.
 #pragma once
 

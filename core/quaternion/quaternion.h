@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Scalar quaternions over any real type, with the paper's exponential and logarithm.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Schur form, standard eigenvalues and eigenvectors of square quaternion matrices.
 #pragma once
 

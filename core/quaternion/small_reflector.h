@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Row-major quaternion scalars, and the reflectors of two or three entries that sweep over them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Singular value decomposition of quaternion matrices.
 #pragma once
 

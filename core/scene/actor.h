@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Who moves through a scene, and where everybody is at a time.
 #pragma once
 

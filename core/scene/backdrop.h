@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The still world of every scene: a street with a tree, a canal and a shop window.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Scenes as text: presets, and lists of effects with their values.
 #pragma once
 

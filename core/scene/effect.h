@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an effect is: its description, the stages of a frame in which it takes part, its needs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pixel work that every scene needs: sprites onto pictures, cropping, light.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Random numbers that a seed, a name and a number decide, whatever else has been drawn.
 #pragma once
 

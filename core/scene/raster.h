@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // 8-bit pictures and planes that own their samples, rows without padding.
 #pragma once
 

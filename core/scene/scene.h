@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A scene: frames of a street with known background, mask, boxes and light.
 #pragma once
 

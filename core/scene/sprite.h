@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Figures that move through a scene: opaque pixels with hard edges, drawn once.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Files that are whole or not there, and files that one process holds.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When the frames of files are shown, found without decoding them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Owners of GStreamer's objects, and what went wrong in a pipeline.
 #pragma once
 

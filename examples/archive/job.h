@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A recording, stretch after stretch, by as many processes as there are.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the processes of a job know of each other: files beside its first result.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Processes that work on the same job: those that mpirun or srun started, and those that this one
 // starts.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmd-archive: backgrounds, masks and foregrounds of recordings, by as many processes as there
 // are.
 #include <gst/gst.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What may be wrong with a picture's file that decoders say nothing of.
 #pragma once
 

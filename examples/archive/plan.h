@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How a recording is shared out: stretches of it, which processes separate one by one.
 #pragma once
 

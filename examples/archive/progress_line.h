@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a job says while it runs: how far it is, and how long it still takes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Windows larger than a machine: the processes of an MPI job have some rows of each picture.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One stretch of a recording through the element, into files.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "examples/archive/video_writer.h"
 
 #include <gst/app/gstappsink.h>

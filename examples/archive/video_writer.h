@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Videos and pictures as files, without loss.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Runs qdmd-archive with --jobs, --part and mpirun: whatever the number of processes, and however
 often they are killed, what they write is the same, and what the element gives.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The time budget in the element: what it makes of some milliseconds a frame, with and without
 // others who want the processor.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What accuracy costs in time: every knob on real sequences and simulated scenes, the solvers'
 // errors against 50 digits, and how times grow. The measurement of docs/accuracy-vs-time.md.
 #include <CLI/CLI.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Numerical errors of the solvers against 50 digits: on windows whose condition number is a knob,
 // on the hard cases of tests/stability, and beside their times on simulated scenes.
 #pragma once

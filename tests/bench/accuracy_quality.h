@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Background quality, time and memory of every setting on clips with true backgrounds.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Time against pixels and against the window, part by part: what exponents are fitted to.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The points that accuracy-cost measures, as a CSV file that a later run continues.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A window through the core at full rank, beside the paper's procedure to the letter on the same
 // frames. That one takes too long for the window that users have, so its growth with the number of
 // pixels is measured, too, and its time there follows from it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What it costs to follow a camera: its motion, beside OpenCV's estimates, and pictures moved.
 #include <benchmark/benchmark.h>
 

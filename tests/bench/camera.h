@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A camera that costs about as much as a copy: a still street with noise, crossed by boxes.
 #pragma once
 

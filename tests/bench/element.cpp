@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Time per frame of the element and of what people take in its place, on the same frames, in turn:
 // each iteration gives every peer its share of frames, so that a busy machine hits all alike.
 #include <benchmark/benchmark.h>

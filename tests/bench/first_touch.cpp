@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What memory costs when it is touched for the first time: in pages of 4 KiB, and as windows take
 // it.
 #include <benchmark/benchmark.h>

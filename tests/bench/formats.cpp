@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What it takes to get a frame of each format in and a picture of it out. One thread, and the time
 // that it computed, because others may use the machine.
 #include <benchmark/benchmark.h>

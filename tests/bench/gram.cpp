@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The exact Gram matrix: kernels, windows, sizes, threads and slices, in products per second,
 // beside the most that the dot-product instruction does when it touches registers alone.
 #include <benchmark/benchmark.h>

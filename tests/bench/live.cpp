@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A camera in real time, the element, a screen that drops what comes late: frames dropped, time in
 // the element and memory of this process. With --unpaced as fast as frames are taken, which is
 // for memory: it depends on frames, not on seconds.

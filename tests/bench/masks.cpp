@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What each step of a mask costs: the decision with all steps and without each in turn, soft edges,
 // and specks and regions beside OpenCV's connected components. One thread, and the time that it
 // computed, because others may use the machine.

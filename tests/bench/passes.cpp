@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The streaming passes over pixels, each beside the time that memory alone needs for the bytes that
 // it reads and writes: whether a pass is bound by memory or by arithmetic. One thread,
 // and the time that it computed, because others may use the machine.

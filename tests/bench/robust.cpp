@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The passes of method=robust, each by itself on what the passes before it left: time of one thread
 // that it computed. Names say what a pixel or a cell is counted of: where a pass looks at all
 // frames at once, a frame's pixel; of the pictures on the grid, a frame's cell, or a pair of

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs the short form of accuracy-cost, run_accuracy.sh PROGRAM, and then once more: a table that is
 # whole, but for a last line cut off, is continued with that line alone.
 set -euo pipefail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the effects of a scene cost in time per frame, each beside the scene without it.
 #include <benchmark/benchmark.h>
 

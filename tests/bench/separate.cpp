@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Time per frame of qdmdseparate with one to four pads, beside one qdmdbackground, and beside two
 // of them behind a tee, in turn: each iteration gives every peer its share of frames.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The small problem after the Gram matrix: time against the number of frames, part by part and
 // solver by solver. Names and the argument m go into docs/notebook/numerics.md.
 #include <benchmark/benchmark.h>

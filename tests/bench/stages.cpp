@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Where the time of a batch goes: a whole window through the engine's steps, each timed by itself,
 // in milliseconds for a frame. The engine runs the same steps, but the Gram matrix beside frames.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What comes and stands still is foreground for its time, and background from then on; what leaves
 // is known at once.
 #include <cmath>

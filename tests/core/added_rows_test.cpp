@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Engines that have some rows of the same pictures each, and add their sums up, find the
 // backgrounds of the whole pictures, to the last bit.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Counts what the engine allocates: after its start, nothing for a frame that begins no solve.
 #include "tests/core/allocator.h"
 #include "tests/core/engine_util.h"

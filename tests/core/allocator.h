@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Stands in for the allocator of a test program that is linked with allocator.cpp: counts
 // allocations, makes them fail, and knows what is alive.
 #pragma once

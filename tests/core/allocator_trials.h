@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which of the allocations that allocator.h saw a test lets fail, one trial each, and what is said
 // where one ends the process.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A camera that shows something else is noticed within ten frames, and learning begins anew; other
 // light is not taken for it.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // L(t) as real pictures: the temporal model, its 8-bit evaluation, and what is foreground.
 #include "core/model/background_model.h"
 

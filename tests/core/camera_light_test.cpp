@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Light as cameras have it: samples at the end of their range, exposure that swings or is looked
 // for, and colours that go; and what they are told by.
 #include <algorithm>

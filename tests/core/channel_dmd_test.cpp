@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Exact DMD of a channel against the paper's Algorithm 1, on pixels.
 #include "core/dmd/channel_dmd.h"
 

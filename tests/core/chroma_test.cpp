@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples that pixels share, against their definitions, on every instruction set of this machine.
 #include "core/passes/chroma.h"
 

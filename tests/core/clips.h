@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Clips: short videos of few pixels, as the tests of core need them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was spent where: spans inside spans, and on other threads.
 #include "core/base/clock.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Looks are weighed by their colours: against the definition, and for what it is.
 #include "core/learn/robust/clutter.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Combinations of planes and of pictures against sums in more digits, on every instruction set.
 #include "core/passes/combine.h"
 

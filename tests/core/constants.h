@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Numbers that tests share, for those that need nothing else of test_util.h: it takes long to
 // compile.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Masks: what they make of light, of textures that move, of lamps, and of pictures in which there
 // is little to see.
 #include "core/foreground/decision.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a camera that moves, or that comes back, shows in more than 8 bits: its backgrounds have all
 // of them.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // An engine for samples of more than 8 bits against a plain reference: whole samples, their inner
 // products in integers, the decomposition, and sums in double.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Samples of more than 8 bits: each pass over them against its definition, on every instruction set
 // of this machine.
 #include "core/passes/digits.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which frames are known to be disturbed, by how many cells do not show the background.
 #include "core/learn/robust/disturbances.h"
 

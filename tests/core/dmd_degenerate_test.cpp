@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Windows that hardly have a decomposition.
 #include "core/dmd/channel_dmd.h"
 #include "core/dmd/qdmd.h"

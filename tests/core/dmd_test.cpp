@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD against its definition and against the paper's procedure.
 #include <Eigen/QR>
 

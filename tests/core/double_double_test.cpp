@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Double-double arithmetic against binary numbers wide enough to be exact.
 #include "core/quaternion/double_double.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the engine writes: the four outputs, any memory layout, alpha.
 #include "tests/core/engine_util.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine from the outside: frames in, pictures out.
 #include <array>
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // An engine fed from clips, and packed pictures with strides, padding and alpha.
 #pragma once
 

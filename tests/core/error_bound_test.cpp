@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How sure a solve says it is, against what happens to it.
 #include "core/dmd/error_bound.h"
 

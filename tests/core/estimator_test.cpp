@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Estimators against what is known of clips that are made of exponentials and noise.
 #include "core/dmd/estimator.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Freeze: the background stays the picture that it was, and nothing is solved.
 #include "tests/core/live_util.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Masks of samples of more than 8 bits against the definition, a frame by itself. (Streams of them
 // are in deep_test.cpp.)
 #include <gtest/gtest.h>

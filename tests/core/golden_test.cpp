@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One input gives one set of bytes: for any number of threads, in every run, with each
 // instruction set of this machine, in every kind of build. Hashes of what scenes gave are in
 // golden.txt; who changes pictures on purpose writes it anew:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The Gram matrix by any number of threads and in slices of pixels: the same bits.
 #include <mutex>
 #include <optional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pictures on a coarse grid, against the slow and obvious way.
 #include "core/passes/grid.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Hessenberg form, Hessenberg systems and triangular systems.
 #include "core/quaternion/hessenberg.h"
 

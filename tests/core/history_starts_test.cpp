@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // From which looks on cells count, beside the slow way of finding that.
 #include "core/learn/robust/history_starts.h"
 

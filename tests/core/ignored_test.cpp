@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Areas in which nothing is foreground, and from which nothing is learnt.
 #include "core/base/ignored_areas.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every kernel against integers of any size.
 #include "core/gram/kernel.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which pixels become landmarks, against the loop over each pixel by itself.
 #include "core/align/landmarks.h"
 

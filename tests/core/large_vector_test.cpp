@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Memory in large pages: where it begins, what is in it, and that the system is asked for them.
 #include "core/base/large_vector.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The layouts of video in memory, sample by sample: what views of it have to mean.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The largest singular value by Lanczos steps, against the whole spectrum.
 #include "core/dmd/reduced_qdmd.h"
 #include "tests/core/test_util.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What was learnt, as bytes and back, damaged and whole.
 #include "core/model/learnt_file.h"
 

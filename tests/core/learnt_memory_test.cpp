@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Memory that runs out while something is saved or loaded: all is as it was, and no frame is lost.
 #include "core/model/learnt_file.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What stood somewhere before a restart, and what was known of it, is known after it.
 #include <cmath>
 #include <functional>

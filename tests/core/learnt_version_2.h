@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A background that version 2 of the format has: 8x6 pixels, RGB, as the element saved it with
 // mode=live window-size=16 after 40 frames of paint_mover (tests/gst/element_test.h).
 #pragma once

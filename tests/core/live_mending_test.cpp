@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is uncovered while solves that know nothing of it are still to come into use.
 #include <array>
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When the live mode does what: whole hops, warm-up, and work that never meets what comes next.
 #include "core/engine/live_plan.h"
 

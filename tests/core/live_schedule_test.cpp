@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A solve whose work is spread over many frames: the same bits, later.
 #include "core/engine/live_schedule.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Live mode from the outside: each frame at once, against the newest model, as computed afresh.
 #include "tests/core/live_util.h"
 

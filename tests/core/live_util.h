@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The live mode the slow way: every model afresh from its frames.
 #pragma once
 

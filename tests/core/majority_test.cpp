@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The majority of a mask's pixels: against counting, and in the pictures that the engine writes.
 #include "core/passes/majority.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The passes behind masks, against their definitions.
 #include "core/foreground/decision.h"
 #include "core/foreground/mask_runs.h"

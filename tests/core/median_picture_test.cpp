@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The median picture of stable frames against its definition, on every instruction set of this
 // machine.
 #include "core/learn/robust/median_picture.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A floor, what comes and goes before it, and a memory of that, whose contours each test says. The
 // constants are those of scene_memory.cpp.
 #pragma once

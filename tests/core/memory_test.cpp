@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What an engine promises to take (EngineLayout, max-memory) is what it takes.
 //
 //   QDMD_LONG=1          all cases: minutes

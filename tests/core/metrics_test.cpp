@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The measures of background pictures and masks: values worked out by hand, and slow versions with
 // explicit loops.
 #include <gtest/gtest.h>

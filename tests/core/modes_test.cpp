@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The rules by which all decompositions choose and scale modes.
 #include "core/dmd/modes.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How a camera moved, against the simulator's truth.
 #include <algorithm>
 #include <random>

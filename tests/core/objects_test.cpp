@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Things that are followed through regions, and what is told of them.
 #include <gtest/gtest.h>
 

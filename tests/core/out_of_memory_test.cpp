@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every allocation of an engine fails once: the caller gets std::bad_alloc or a Status, and the
 // engine can be used again, loses no frame and no memory.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Batch with windows that are solved while the next frames come: the same pictures as of windows
 // that are solved at once, later.
 #include "tests/core/engine_util.h"

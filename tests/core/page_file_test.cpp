@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Windows whose frames lie in a file: the same pictures, less memory, and refusals that say why.
 #include "core/base/page_file.h"
 

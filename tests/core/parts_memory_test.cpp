@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What each part of the core promises to take is what it takes: of these sums a whole engine's
 // promise is made (memory_test), where one part's mistake may be too small to be seen.
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The passes over pixels against their definitions, on every instruction set of this machine.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The eigenvalue of a Hessenberg pencil nearest to one, against the whole spectrum.
 #include "core/quaternion/pencil.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames of every layout in, and pictures of every layout out, sample by sample.
 #include "core/foreground/picture.h"
 

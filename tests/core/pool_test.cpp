@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The thread pool: every part once, on any number of threads, with the caller among them.
 #include "core/parallel/pool.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Masks of simulated scenes that are found in a smaller picture, beside those of all pixels.
 #include <algorithm>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Masks that are found in a smaller picture: how frames become small and pictures large, against
 // plain references, and an engine that does both against one that is given small frames.
 #include <algorithm>

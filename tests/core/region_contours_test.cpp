@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What stands before what, by the edges along a region's border in full resolution.
 #include "core/learn/robust/region_contours.h"
 

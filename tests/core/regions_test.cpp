@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Boxes around foreground: joined, merged, counted, and left out where they are small.
 #include "core/foreground/regions.h"
 

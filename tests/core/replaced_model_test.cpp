@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a background does with a model that has something in it which is not a number.
 #include <cmath>
 

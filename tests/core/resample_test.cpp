@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pictures seen from a little beside against their definition, on every instruction set.
 #include <cmath>
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The passes of robust Q-DMD over pixels against their definitions, on every instruction set of
 // this machine.
 #include "core/passes/fill.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What robust Q-DMD knows beyond its window: frames that have left it, the looks of cells, what was
 // uncovered, and light that is followed.
 #include <cmath>

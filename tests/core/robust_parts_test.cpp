@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The parts of robust Q-DMD that work on a coarse grid, but for the grid itself, against the slow
 // and obvious way.
 #include <numeric>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // method=robust on simulated scenes and on shaken pictures of real size, against the truth.
 #include "core/scene/scene.h"
 #include "tests/core/robust_util.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine with method=robust: windows without foreground, with much of it, and changing light.
 #include <tuple>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the tests of robust Q-DMD share: windows of real size, coarse pictures, whole runs.
 #pragma once
 

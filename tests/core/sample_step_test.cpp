@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // sample-step: the decomposition sees every k-th pixel in x and y, the pictures are whole.
 #include <malloc.h>
 

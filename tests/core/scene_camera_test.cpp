@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Sensor noise and jitter against their models.
 #include <algorithm>
 #include <complex>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Scenes as text: what is read, and what errors say.
 #include "core/scene/description.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Disturbances: when they are there, what they show, and that the truth goes on as without them.
 #include <algorithm>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a camera makes of light: its curve, white that clips, exposure that hunts, colour that goes;
 // and light that falls on a part of the picture.
 #include <algorithm>

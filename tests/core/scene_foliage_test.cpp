@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Leaves before the camera: how much they hide, of which colours they are, and when they move.
 #include <algorithm>
 #include <map>

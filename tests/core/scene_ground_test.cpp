@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What objects do to the ground: the soft edge of a shadow, and a floor that mirrors.
 #include <algorithm>
 

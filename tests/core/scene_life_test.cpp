@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a camera on a wall sees in its life: people who come and stand, people who stood there and
 // leave, moments without a picture, and another scene; for windows of any size, live and in batch.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Effects on light, weather, focus and coding against their formulas.
 #include <algorithm>
 #include <complex>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is proved of regions, row by row of the table in scene_memory.h.
 #include "tests/core/memory_stage.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is proved of the whole picture, what solves are told, and what is forgotten.
 #include "tests/core/memory_stage.h"
 

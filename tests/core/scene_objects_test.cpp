@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Effects on objects, background and shutter: who is where when, and what is seen of it.
 #include <algorithm>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // People who come and stand, and people who stand there and leave: where, when, and what is true.
 #include <algorithm>
 

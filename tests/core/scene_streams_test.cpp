@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Random streams, and that no effect touches what another one does.
 #include <algorithm>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What holds for every scene: the same bytes however a frame is reached, true truth, any size.
 #include "core/scene/scene.h"
 

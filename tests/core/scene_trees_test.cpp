@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Trees near the camera: how much they hide, how they sway, and that everybody is behind them.
 #include <algorithm>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/quaternion/schur.h"
 
 #include "tests/core/test_util.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine on simulated scenes, against their true backgrounds and masks.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Inner products of frames whose chroma samples are shared: the same bits as those of frames in
 // which each pixel has its own.
 #include "core/gram/shared_chroma.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames whose pixels share samples of chroma, from the engine's one end to the other: what leaves
 // is what leaves where each pixel's own samples are kept.
 #include <gtest/gtest.h>

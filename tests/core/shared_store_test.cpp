@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames that are kept with chroma of its own size: what is read of them is what it was.
 #include "core/engine/engine_options.h"
 #include "core/frames/frame_store.h"

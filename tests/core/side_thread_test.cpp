@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One piece of work beside its caller: order, exceptions, and how it ends.
 #include "core/parallel/side_thread.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Runs a check once for each instruction set that this machine has and the passes are built for.
 #pragma once
 

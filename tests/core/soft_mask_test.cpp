@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Soft edges of masks: the filter against its definition, and what it makes of pictures.
 #include "core/foreground/soft_mask.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Soft masks on simulated scenes: how much outlines that stand still change from frame to frame.
 #include <cmath>
 #include <string>

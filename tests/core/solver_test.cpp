@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every solver against the paper's procedure, on windows that have a decomposition.
 #include "core/dmd/decompose.h"
 #include "core/dmd/qdmd.h"

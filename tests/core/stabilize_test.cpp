@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine before a camera that moves.
 #include <cmath>
 #include <random>

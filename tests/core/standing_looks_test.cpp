@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What cells show, cell by cell and in plain words, beside what is followed in blocks.
 #include "core/learn/robust/standing_looks.h"
 

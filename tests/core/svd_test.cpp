@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Singular value decompositions of quaternion matrices.
 #include "core/quaternion/svd.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the tests of core share: random quaternions, options, L(t) in double.
 #pragma once
 

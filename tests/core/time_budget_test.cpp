@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The time budget: what it chooses from what it measured. Times are made up: a slow machine changes
 // nothing here.
 #include "core/engine/time_budget.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Batch: who stands through a window and leaves is foreground in the frames of it that still wait.
 #include "core/learn/robust/standing_looks.h"
 

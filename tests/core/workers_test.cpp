@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Work beside the caller, the pool that it uses, and the caller that helps where it waits.
 #include "core/parallel/workers.h"
 

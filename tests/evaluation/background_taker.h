@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Keeps of all L(t) the one that is scored.
 #pragma once
 

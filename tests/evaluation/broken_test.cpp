@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmd-evaluate where something is wrong: broken folders, wrong options, and being killed.
 #include <sys/stat.h>
 

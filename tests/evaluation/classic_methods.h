@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Background models to compare with: mean, median, and OpenCV's MOG2 and KNN.
 #pragma once
 

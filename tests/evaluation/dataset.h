@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The folders of SBI, SBMnet and CDnet: which sequences there are, and which files they have.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The plugin's element: its methods by name, its properties from the command line.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The core without GStreamer's data flow: faster, the same pictures.
 #pragma once
 

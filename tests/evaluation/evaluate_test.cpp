@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmd-evaluate from outside: tables, layouts, pictures, masks, and the element beside the core.
 #include <cmath>
 #include <map>

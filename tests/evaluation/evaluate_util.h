@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Runs qdmd-evaluate as a process, on data sets that are painted for a test.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Markdown table: what other values of the constants of learning_steps.h would give.
 
 Usage: learning_constants.py [--long] [--factors 0.7,1.4] [--only NAME...] [--jobs N] [--folder FOLDER]

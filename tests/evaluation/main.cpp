@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmd-evaluate: background pictures and masks of every method on data sets with truth.
 #include <gst/gst.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What other constants of a decision would give: the plateaus of docs/notebook/masks.md.
 #include <CLI/CLI.hpp>
 #include <cstdio>

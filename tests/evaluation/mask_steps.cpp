@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What each step of a mask brings, beside OpenCV's masks: the measurement of
 // docs/notebook/masks.md.
 #include <CLI/CLI.hpp>

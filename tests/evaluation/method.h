@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What separates a clip into a background and masks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the masks of simulated scenes show, and what is true of them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How well boxes with numbers follow the true ones, and how well events are told.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The scores of trackers and of events, on cases that are counted by hand.
 #include "tests/evaluation/object_scores.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How well things are followed and told of, in simulated scenes whose truth is known: the tables of
 // docs/objects.md.
 #include <CLI/CLI.hpp>

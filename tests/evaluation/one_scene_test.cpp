@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Real sequences of one scene: nothing that happens in front of it is taken for another one.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The element as users get it: appsrc ! qdmdbackground ! appsink.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Progress and problems on standard error: one line that changes on a terminal, else a line a job.
 #pragma once
 

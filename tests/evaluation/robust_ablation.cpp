@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What each setting and each constant of robust Q-DMD brings: the measurement of
 // docs/notebook/robust.md.
 #include <CLI/CLI.hpp>

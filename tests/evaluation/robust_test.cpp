@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Robust Q-DMD on real sequences: at most 300 frames of each, evenly thinned, in one window.
 #include <map>
 

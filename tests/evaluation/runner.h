@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every sequence by every method, several at a time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How far sampled pixels move the background: the measurement behind sample-step=0.
 #include <CLI/CLI.hpp>
 #include <algorithm>

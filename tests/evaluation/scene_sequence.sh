@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Writes a simulated scene as a sequence for qdmd-evaluate, its frames as x264 leaves them:
 #
 #   scene_sequence.sh FOLDER SCENE [KBIT/S [FRAMES]]
@@ -8,7 +9,7 @@
 # qdmd-evaluate scores; both are those of the scene before the encoder. An encoder remembers frames, so
 # that none follows from its number alone: it can be no effect of the scene.
 set -euo pipefail
-usage() { sed -n '2,/^set/{/^set/d;s/^# \?//;s/scene_sequence.sh/'"$(basename "$0")/;p}" "$0"; }
+usage() { sed -n '3,/^set/{/^set/d;s/^# \?//;s/scene_sequence.sh/'"$(basename "$0")/;p}" "$0"; }
 if [ "${1-}" = --help ]; then
   usage
   exit

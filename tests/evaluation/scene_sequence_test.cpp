@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // scene_sequence.sh: frames after a real encoder, in step with the truth of the scene before it.
 #include <gst/gst.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Two real sequences with loose bounds: what the methods made of them must not get worse.
 #include <cmath>
 #include <set>

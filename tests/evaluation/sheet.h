@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Contact sheets: what a sequence's methods made of it, side by side.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Draws the spectrum of one window, as the paper does: eigenvalues in the unit circle, and |omega| by
 amplitude, what was taken for background filled.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Results on disk, so that a run that was killed goes on where it was.
 #pragma once
 

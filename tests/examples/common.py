@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """What the tests of the examples share: short films, pictures, and a report in TAP."""
 import subprocess
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Runs every gst-launch-1.0 command of the documentation, with stand-ins for what is not here.
 
 Usage: pipelines_test.py SOURCE_ROOT

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Runs every program of examples/ and looks at what it leaves.
 
 Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that are built)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Turns the bytes of an input into choices. After the last byte every choice is the first one.
 #pragma once
 

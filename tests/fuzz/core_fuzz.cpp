@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Fuzz target: the engine and libqdmd, with any options, in any order of calls, where memory runs
 // out, on windows of few pixels that are degenerate more often than not.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Fuzz target: folders of pictures, as the evaluation tool reads them, of any names and bytes.
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>

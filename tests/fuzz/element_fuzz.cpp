@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Fuzz target: both elements, with any caps, buffers, events, queries, properties, states and flows
 // in any order, where memory runs out and downstream refuses.
 #include <gst/gst.h>

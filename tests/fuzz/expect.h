@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a target demands: a process that breaks it ends, with a sentence.
 #pragma once
 

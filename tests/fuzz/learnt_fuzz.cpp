@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Fuzz target: a saved background's bytes are read whole, or refused with a sentence.
 #include <algorithm>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A sink behind one source pad of an element that is fuzzed: it demands that what arrives are whole
 // frames of the caps before them, in order.
 #pragma once

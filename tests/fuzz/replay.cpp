@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Runs a fuzz target without a fuzzer: the inputs in files and folders, and random ones.
 //
 //   replay FILE_OR_FOLDER...             inputs that are kept, all of them

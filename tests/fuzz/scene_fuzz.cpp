@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Fuzz target: a scene's text is read, or refused with a sentence; what is read is drawn.
 // cases/scene has each preset and effect to begin with: after 17 bytes that ask for a drawing comes
 // its name.

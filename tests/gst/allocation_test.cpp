@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Counts what the element itself allocates: after the first window, nothing for a frame that begins
 // no solve. What GStreamer's pools and metadata do is theirs.
 #include <algorithm>

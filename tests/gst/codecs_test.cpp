@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Files of real encoders through decodebin, without a conversion before the element.
 #include <glib/gstdio.h>
 #include <gst/gst.h>

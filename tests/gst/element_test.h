@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Pushes frames through one qdmdbackground in a GstHarness.
 #pragma once
 

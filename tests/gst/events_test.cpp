@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What becomes of a window when an event or a query arrives in its middle: one test a row.
 #include <gst/video/gstvideometa.h>
 

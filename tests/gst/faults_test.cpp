@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What goes wrong around an element: no threads, sinks that fail, clocks that jump, a process that
 // is stopped, another element that fails. An error with a sentence or the same frames, nothing
 // else.

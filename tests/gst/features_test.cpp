@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The background sample, regions, formats, and properties that change while playing.
 #include <gst/controller/controller.h>
 #include <gst/video/gstvideometa.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Prints a hash of what qdmdbackground gives under many settings, a line each: run it with the
 // plugins of two builds, and `diff` tells which pictures a change has moved by a bit.
 //

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """The most memory of a process whose window is I420 is below 0.6 times that of RGB.
 
   GST_PLUGIN_PATH_1_0=build/gst tests/gst/format_memory_test.py

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Y, U and V in every layout against a plain reference: each sample given to the pixels that share
 // it, the element on these, and the mean of what comes out. The same of all depths.
 #include <array>

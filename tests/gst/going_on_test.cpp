@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is no reason to forget: frames that are missing, clocks that are corrected, caps that say
 // more of the same video. And what is one.
 #include <algorithm>

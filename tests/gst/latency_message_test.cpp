@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When qdmdbackground tells its pipeline of another latency, by clocks of the tests' own.
 #include <gst/video/gstvideometa.h>
 

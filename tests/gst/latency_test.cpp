@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the element answers a LATENCY query, from rates and timestamps alone.
 #include "gst/latency.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The engine as a library: what it gives is what the element gives, and what OpenCV's users expect.
 #include "core/library/opencv.h"
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Compares the element with the paper's algorithms, written out a second time in numpy.
 
 40 frames of 52x36 with noise 3, moving boxes and a light that drifts by 0.4 % a frame; the element

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // mode=live: no delay, one buffer out for each in, whatever happens to the stream; freeze, reset.
 #include <cmath>
 #include <string>

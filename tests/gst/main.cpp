@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Runs the element tests with fatal warnings; gst_deinit lets the leaks tracer report.
 #include <gst/gst.h>
 #include <gtest/gtest.h>

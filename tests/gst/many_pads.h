@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Feeds one element by hand, and listens to any of its source pads.
 #pragma once
 

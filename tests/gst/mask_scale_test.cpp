@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // mask-scale: masks that are found in a smaller picture, and when the element chooses that.
 #include <glib/gstdio.h>
 

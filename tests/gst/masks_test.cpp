@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What masks leave out and how they fade, as users ask for it.
 #include <gst/video/gstvideometa.h>
 

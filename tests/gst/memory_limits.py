@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """How a pipeline of 4K frames ends under limits of its address space.
 
   GST_PLUGIN_PATH_1_0=build/gst tests/gst/memory_limits.py [--from 250 --to 700 --steps 19]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What the element posts of its solves, of another scene, and of the spectrum.
 #include <cmath>
 #include <complex>

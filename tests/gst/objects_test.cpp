@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Things: the numbers of regions, the messages of what becomes of things, and what ends them.
 #include <algorithm>
 #include <map>

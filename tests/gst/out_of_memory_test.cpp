@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every allocation of the element fails once: the application gets RESOURCE/NO_SPACE_LEFT or all
 // its frames, and the element can be used again. What GLib and GStreamer allocate does not fail:
 // GLib ends the process where there is no memory.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A live pipeline whose time a test advances: every frame is at the sink when it was promised, and
 // no wall clock says so.
 #include <gst/check/gsttestclock.h>

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs a program under valgrind: run_valgrind.sh VALGRIND ARGUMENT... Skips where the processor hides RDTSCP, as that of
 # some virtual machines does: valgrind tells programs that it is there, and ends those that use it. Highway does when it
 # is loaded.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The signals `save` and `load`, and the property `load-location`.
 #include <glib/gstdio.h>
 

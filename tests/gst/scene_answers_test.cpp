@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What qdmdscenesrc answers when it is asked: properties, queries, messages.
 #include <gst/gst.h>
 #include <gtest/gtest.h>

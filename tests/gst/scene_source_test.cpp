@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmdscenesrc in pipelines: frames, truth, formats, seeks, ends, errors.
 #include <gst/check/gstharness.h>
 #include <gst/video/video.h>

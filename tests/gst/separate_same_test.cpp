@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmdseparate: each pad gives what a qdmdbackground of its own would.
 #include "tests/gst/many_pads.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // qdmdseparate: pads negotiate, come and go, and end, each by itself, whatever happens to others.
 #include <algorithm>
 #include <atomic>

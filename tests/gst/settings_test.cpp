@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Properties as they are read and set, the warnings of settings that change nothing or come too
 // late, and stats.
 #include <algorithm>

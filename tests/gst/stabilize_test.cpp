@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A camera that moves, as users see it: properties, messages, stats.
 #include <gst/gst.h>
 #include <gtest/gtest.h>

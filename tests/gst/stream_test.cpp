@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames in and frames out: counts, order, timestamps, flags, metadata, events.
 #include "tests/gst/element_test.h"
 

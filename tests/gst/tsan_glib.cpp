@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Tells ThreadSanitizer of GLib's locks: they are futexes in a library that it does not see into.
 #include <dlfcn.h>
 #include <glib.h>

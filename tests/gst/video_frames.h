@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames of every format as numbers: made, expanded, reduced, and sent through the element.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The qdmdbackground of a Stream: its properties, and what it posts.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what BUILD holds below a temporary root, tries it there and uninstalls it:
 # install_test.sh BUILD FOLDER FILE..., where FOLDER is to hold exactly the plugins FILE, beside LIBRARY_FILES.
 set -euo pipefail

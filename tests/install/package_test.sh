@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes the Debian packages of the plugins and tries what is in them: package_test.sh SOURCE BUILD VERSION.
 #
 # The packages hold the plugins of BUILD, since compiling takes minutes; with QDMD_TEST_PACKAGE=1 all

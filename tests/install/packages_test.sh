@@ -18,9 +18,7 @@ find / -xdev -name '*qdmd*' ! -path '/root/*' ! -path '/tmp/*' ! -path '/proc/*'
 
 if command -v lintian >/dev/null; then
   echo "== lintian"
-  # Nobody who makes these packages has an address yet.
-  lintian --allow-root --fail-on warning,error \
-    --suppress-tags bogus-mail-host,bogus-mail-host-in-debian-changelog "${packages[@]}"
+  lintian --allow-root --fail-on warning,error "${packages[@]}"
 fi
 
 echo "== the ten lines of docs/python.md, with nothing but their package"

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Asks GStreamer for the plugin in FOLDER and sends ten frames through it: try_plugin.sh FOLDER.
 set -euo pipefail
 work=$(mktemp -d)

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables and plots of docs/accuracy-vs-time.md and its notebook anew, in less than half an hour on two
 # idle cores. Real sequences need QDMD_DATA, the folder that has SBI, SBMnet and CDnet; without it there
 # are simulated scenes alone. The table stays in build/accuracy.

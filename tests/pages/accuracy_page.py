@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts the tables of accuracy-cost between the markers of docs/accuracy-vs-time.md and its notebook, and draws
 their plots. Says which of the promised growths and errors do not hold.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """The plots of docs/accuracy-vs-time.md."""
 import math
 import os

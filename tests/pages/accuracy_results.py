@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """What accuracy-cost wrote: rows, their averages, fits, and what was promised of them."""
 import collections
 import csv

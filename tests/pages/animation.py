@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """A short animated picture of a video, its background and what moves alone, by the element at its defaults.
 
 usage: animation.py VIDEO FOLDER PICTURE

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts what qdmd-archive takes in time into docs/archive.md anew, how far masks of parts are those of
 # one piece, and the model that follows. Takes some forty minutes of a machine that does nothing else.
 #

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Times qdmd-archive with one process and two, compares masks of parts with those of one piece, and
 puts both and a model of many machines into a page.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # What the scripts of this folder share. It takes them to the root of the project and gives them the
 # elements of build/gst. What a script measures stays in $results.
 

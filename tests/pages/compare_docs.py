@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Fails unless the reference inside a page is what a program prints.
 
 Usage: compare_docs.py PAGE MAKER PROGRAM [ARGUMENT...]

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes the reference of docs/element.md anew, from what the elements say of themselves.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints the reference part of docs/element.md: what the elements say of themselves.
 
 Usage: element_page.py    (GST_PLUGIN_PATH names the folder of the plugins)

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables and pictures of docs/evaluation.md and its notebook anew. Needs the sequences: QDMD_DATA names the
 # folder that has SBI, SBMnet and CDnet. Takes a few minutes; stopped and started again, it goes on
 # where it was. Backgrounds and contact sheets stay in build/evaluation.

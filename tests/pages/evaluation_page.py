@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts measured and quoted tables between the markers of docs/evaluation.md and its notebook, and draws its plot.
 
 Usage: evaluation_page.py PAGE NOTEBOOK PAPER_CSV PLOT_SVG TABLES

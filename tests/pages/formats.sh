@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables and the plot of the formats into docs/formats.md anew. Takes about three minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """What formats cost, and what 10 bits are good for: tables and a plot for docs/formats.md.
 
 Usage: formats_page.py PAGE RESULTS IMAGES

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables and pictures of docs/masks.md and its notebook anew. Needs the sequences: QDMD_DATA names the folder
 # that has SBI, SBMnet and CDnet; QDMD_MORE one that has `fall` and `pedestrians` of CDnet. Takes about
 # ten minutes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts measured tables between the markers of docs/masks.md and its notebook, and the scenes' sheets together.
 
 Usage: masks_page.py PAGE NOTEBOOK RESULTS

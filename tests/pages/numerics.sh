@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables of docs/notebook/numerics.md anew: the hard cases against 50 digits, what noise does to the
 # estimators, and the times of the small problem. Takes some minutes.
 set -euo pipefail

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts the hard cases, the estimators and the times of the small problem into docs/notebook/numerics.md.
 
 Usage: numerics_page.py PAGE RESULTS

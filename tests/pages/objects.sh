@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes the tables and the picture of docs/objects.md. Takes ten minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

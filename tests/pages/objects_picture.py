@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Draws docs/objects.md's picture from a real run: a frame of a street with the numbers of things,
 and a time line of what was told of them.
 

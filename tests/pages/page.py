@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """What pages are made of: text between markers, tables and short numbers.
 
 A page has a marker before and a marker after what is made: <!-- NAME --> and <!-- end of NAME -->.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Tests what puts text between the markers of a page, and the pages themselves.
 
 Usage: page_test.py SOURCE_ROOT

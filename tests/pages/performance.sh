@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables and plots of docs/performance.md and its notebook anew, in a quarter of an hour on an
 # idle machine. What the programs print stays in build/performance.
 #

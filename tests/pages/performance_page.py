@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts measured tables between the markers of docs/performance.md and its notebook, and draws their plots.
 
 Usage: performance_page.py PAGE NOTEBOOK PLOT_FOLDER RESULTS

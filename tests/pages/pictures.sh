@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes README.md's animated picture of a street from a real run of the element: docs/images/street.webp.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes the pictures of examples/pipelines.md from simulated scenes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Reads pages as people do: their sentences, their links and the places that links can lead to."""
 import re
 import urllib.parse

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints README.md's table of figures from the tables of other pages, each of which a script made.
 
 usage: readme_page.py DOCS

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the figures of docs/notebook/reliability.md anew, from the logs of runs that took hours:
 #
 #   tests/fuzz.sh --runs 1000000                          leaves build-fuzz/TARGET.log; those of several

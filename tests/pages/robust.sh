@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables of docs/notebook/robust.md, and its pictures, anew. Needs the sequences: QDMD_DATA names the
 # folder that has SBI, SBMnet and CDnet. Takes some twenty minutes.
 set -euo pipefail

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts what was measured of robust Q-DMD into docs/notebook/robust.md.
 
 Usage: robust_page.py PAGE RESULTS

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the table of docs/sampling.md anew. Needs the sequences: QDMD_DATA names the folder that has
 # SBI, SBMnet and CDnet. Takes a few minutes.
 set -euo pipefail

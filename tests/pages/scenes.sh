@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Makes docs/scenes.md's reference, its pictures (frame, true background and mask by three sources of
 # one seed) and the notebook's table of times anew. Takes some minutes.
 set -euo pipefail

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Puts the reference of scenes into docs/scenes.md, and their times into its notebook.
 
 Usage: scenes_page.py PAGE NOTEBOOK RESULTS

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Draws the spectra of docs/algorithm.md and its notebook: forty frames of a street, at full rank, where one mode is the
 # background, and 150 of Board (SBI), where several share it. A minute.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the table of whole pipelines into docs/performance.md anew: the element beside `segmentation`, and video as
 # decoders give it beside a conversion in front; and how even the frames of mode=live are. Takes some eight minutes and
 # 4 GB below build/.

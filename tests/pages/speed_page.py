@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Times whole pipelines, in turns, and puts milliseconds a frame less identity into a page.
 
 usage: speed_page.py PAGE VIDEO FOLDER LIVE

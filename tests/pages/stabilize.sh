@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the tables, the plot and the picture of docs/stabilize.md anew. Takes about five minutes.
 set -euo pipefail
 source "$(dirname "$0")/common.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """Measures scenes in which the camera moves, and puts the results into docs/stabilize.md.
 
 Usage: stabilize_page.py PAGE RESULTS IMAGES

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
 # Puts the table and the plot of docs/robust.md anew that say what a stream's backgrounds are worth. Needs
 # the sequences: QDMD_DATA names the folder that has SBI, SBMnet and CDnet. Takes some four minutes.
 set -euo pipefail

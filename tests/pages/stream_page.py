@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
 """AGE of what was seen, frame by frame: the element beside MOG2, KNN and the median of all frames so far.
 
 usage: stream_page.py PAGE PLOT

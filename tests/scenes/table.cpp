@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Prints the reference of scenes for docs/scenes.md, from the descriptions that the parser uses.
 #include <cstdio>
 

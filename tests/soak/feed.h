@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // One element that is fed by hand; frames carry their number in their alpha, which it lets through.
 #pragma once
 

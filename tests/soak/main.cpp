@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Runs the elements for long, and looks at what a process that runs for months would run out of:
 // memory, file descriptors and threads stay as they are, and no frame is lost or changes places.
 //

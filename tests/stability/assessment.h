@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // How each solver does on a hard window, and what could be asked of it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "tests/stability/decimal_solver.h"
 
 #include <random>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Q-DMD of a window in 50 decimal digits, and how far its answer moves when the window does.
 #pragma once
 

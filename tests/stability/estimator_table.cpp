@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // estimator-table [SEEDS]: prints the table of docs/notebook/numerics.md that shows what noise does
 // to each estimator, against fades whose lambda is known.
 #include <cmath>

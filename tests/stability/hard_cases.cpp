@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "tests/stability/hard_cases.h"
 
 #include "tests/core/clips.h"

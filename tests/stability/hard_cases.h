@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Named windows that are hard to decompose.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Random windows that hardly have a decomposition, and what each solver makes of them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // random-windows COUNT [--digits] [--first SEED] [--frames MOST]: judges so many random windows and
 // prints each fault, and a last line.
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Random degenerate windows: a thousand, or with QDMD_LONG=1 twenty thousand.
 #include "tests/stability/random_windows.h"
 

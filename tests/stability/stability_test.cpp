@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Every hard case, solver, method and amplitude; errors against a reference in 50 digits.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Prints the table of docs/notebook/numerics.md: each hard case, each solver, against 50 digits.
 #include <cstdio>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What moves in front of most of the picture has colours of its own.
 #pragma once
 

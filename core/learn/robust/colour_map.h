@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A scene in other colours: what a camera shows of it once it has switched to infra-red.
 #pragma once
 

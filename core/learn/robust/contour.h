@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What stands before what: two looks of a region are told apart by the contour around it.
 #pragma once
 

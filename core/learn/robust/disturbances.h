@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Moments in which something disturbs the picture as a whole: no signal, a smear, fog.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a window leaves to the next: its background, and how sure it was.
 #pragma once
 

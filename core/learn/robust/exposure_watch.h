@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Notices when a camera that starts has found its exposure.
 #pragma once
 

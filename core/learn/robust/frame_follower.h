@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Follows the frames of a stream between its solves, with the background in use.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Frames that have left the window: some of them are kept, the older, the sparser.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // From which frame on cells show their background: frames from before say nothing there.
 #pragma once
 

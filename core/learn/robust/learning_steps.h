@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The constants that robust Q-DMD learns by, step by step. Users have no say in them:
 // docs/notebook/robust.md has what other values would give.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Global changes of light: how much brighter a frame is than another picture of the same scene.
 #pragma once
 

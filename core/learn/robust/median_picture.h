@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The median of the frames that show the background, and how far they lie from it.
 #pragma once
 

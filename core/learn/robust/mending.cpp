@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What frames put in place of a background's cells between two solves.
 #include <algorithm>
 #include <array>

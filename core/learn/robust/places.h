@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is known of cells, as files have it: times count back from the newest frame, and the grid
 // may be another.
 #pragma once

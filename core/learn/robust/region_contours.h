@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The edges of two pictures along the border of a region in which they differ.
 #pragma once
 

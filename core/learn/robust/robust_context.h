@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What all parts of the robust learner know: its options, and where it works.
 #pragma once
 

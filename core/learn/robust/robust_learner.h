@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Robust Q-DMD: the background modes of a window whose foreground was taken out.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What is known of each place of the scene, and by what proof: what stands there came, or it was
 // uncovered.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Notices that the camera shows something else: it was moved, covered, or switched to another view.
 #pragma once
 

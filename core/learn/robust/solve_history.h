@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What a solve is told of each place: which frames show its background, and which do not.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Which frames show a region's background: the start of robust Q-DMD.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What each cell of the picture shows, and since when: passers-by aside.
 #pragma once
 

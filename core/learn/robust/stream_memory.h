@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // What windows leave to the windows after them, scene by scene.
 #pragma once
 

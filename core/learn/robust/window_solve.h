@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The solve of a window: robust Q-DMD of its frames, told of what was known before.
 #pragma once
 

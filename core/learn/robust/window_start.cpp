@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The start of a window's solve: a background picture of the frames that show it.
 #include <algorithm>
 #include <array>

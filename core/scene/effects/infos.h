@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The descriptions of the effects; each is defined in the one file that simulates it.
 #pragma once
 

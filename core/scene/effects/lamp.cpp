@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/scene/effects/infos.h"
 
 #include "core/scene/effects/times.h"

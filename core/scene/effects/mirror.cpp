@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // A polished floor in which whoever stands on it is seen upside down.
 #include "core/scene/effects/infos.h"
 

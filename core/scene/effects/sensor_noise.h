@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Shot and read noise of a camera's sensor, as the effects noise and night add it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // People who stand somewhere in the street for long, as the effects stand and leave place them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // When a disturbance is there: from a time on for some seconds, and again after a period.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Trees near the camera, whose boughs sway before whatever is behind them.
 #include "core/scene/effects/infos.h"
 
