@@ -239,8 +239,8 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     in_rows([&](int first, int size) { learn(first, size); });
     noise_.end_frame(mask);
   }
-  // Where a shadow was is no place to learn noise from.
-  if (steps_.hard && knows_light()) leave_hard_shadows();
+  // Where a shadow was is no place to learn noise from. Much noise hides texture.
+  if (steps_.hard && !now_.means && knows_light()) leave_hard_shadows();
   find_colour();
   ++frames_;
 }

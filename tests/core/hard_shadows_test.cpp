@@ -391,7 +391,7 @@ Taken taken_in(const std::string& text, uint64_t seed) {
 
 TEST(HardShadows, AreNoForegroundInASimulatedStreet) {
   for (const char* shadow : {"shadow=0.65:length=0.9:softness=2", "shadow=0.8:length=0.9",
-                             "shadow=0.75:length=0.9:blue=0.2"}) {
+                             "shadow=0.75:length=0.9:blue=0.1"}) {
     SCOPED_TRACE(shadow);
     const Taken taken = taken_in(std::string("basic,bootstrap=3,") + shadow, 14);
     EXPECT_LT(taken.shadow, 0.25);
