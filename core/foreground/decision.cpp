@@ -240,7 +240,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     noise_.end_frame(mask);
   }
   // Where a shadow was is no place to learn noise from. Much noise hides texture.
-  if (steps_.hard && !now_.means && knows_light()) leave_hard_shadows();
+  if (steps_.hard && !now_.means && knows_light() && !much_moves()) leave_hard_shadows();
   find_colour();
   ++frames_;
 }
@@ -502,6 +502,15 @@ void Decision::look_around(Run* run) {
 // Whether the background in another light is to be left out, and can be told.
 bool Decision::knows_light() const {
   return !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground;
+}
+
+// Before a camera that shakes, what is seen is the background beside its place: it has the
+// background's texture, in any light.
+bool Decision::much_moves() const {
+  const auto cells = static_cast<size_t>(texture_.grid().rows * texture_.grid().cols);
+  size_t moving = 0;
+  for (size_t cell = 0; cell < cells; ++cell) moving += moves(cell);
+  return static_cast<double>(moving) > constants().hard.most_moving * static_cast<double>(cells);
 }
 
 void Decision::leave_hard_shadows() {

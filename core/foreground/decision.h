@@ -155,6 +155,7 @@ class Decision {
   void look_at(Run* run);
   void look_around(Run* run);
   bool knows_light() const;
+  bool much_moves() const;
   void leave_shadows(const Run& run);
   void leave_hard_shadows();
   void learn(int first_row, int row_count);

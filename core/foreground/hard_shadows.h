@@ -37,6 +37,8 @@ struct HardShadowConstants {
   // Width of the ratios that are told apart, in logs, and frames until half of what is known of
   // them is forgotten.
   double width = 0.12, half_life = 350;
+  // Nothing is looked at where textures move in more than this share of the picture.
+  double most_moving = 0.1;
 };
 
 // Looks at a mask's pixels in blocks. A region of blocks in which light has one ratio may be a
