@@ -253,7 +253,8 @@ size_t HardShadows::ratio_of(const Region& region) const {
                   place(static_cast<double>(b - g), kHues / 2, kHues));
 }
 
-// Which regions are shadows; then all regions add to what is known.
+// Which regions are shadows; then those that are large add to what is known: outlines before a
+// camera that shakes are small, and follow the background.
 void HardShadows::decide() {
   constexpr double kSquares = 2 * kLogs * kLogs;  // each pair was added twice
   const auto is_large = [&](const Region& region) {
@@ -279,7 +280,7 @@ void HardShadows::decide() {
   const auto kept = static_cast<float>(std::exp2(-1 / constants_.half_life));
   for (size_t k = 0; k < kRatios; ++k) known_.both[k] *= kept, known_.level[k] *= kept;
   for (const Region& region : regions_) {
-    if (!is_large(region)) continue;
+    if (static_cast<double>(region.blocks) < 4 * constants_.least_blocks) continue;
     const size_t ratio = ratio_of(region);
     known_.both[ratio] += static_cast<float>(static_cast<double>(region.both) / kSquares);
     known_.level[ratio] += static_cast<float>(level_of_region(region));
