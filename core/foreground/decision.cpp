@@ -144,6 +144,7 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
       grey_(colours == Colours::grey),
       texture_(width, height, steps.constants),
       noise_(width, height, steps.constants),
+      hard_(width, height, shape_.step, steps.constants.hard),
       specks_(width, height),
       unknown_(static_cast<size_t>(shape_.strips)) {
   for (auto& level : of_.level) level.resize(shape_.padded(), 0);
@@ -159,23 +160,25 @@ uint64_t Decision::bytes(int width, int height) {
   const Shape shape(width, height, true);
   return 5 * uint64_t{shape.padded()} + 2 * uint64_t{shape.pixels()} +
          MovingTexture::bytes(width, height) + PixelNoise::bytes(width, height) +
-         Specks::bytes(width, height);
+         HardShadows::bytes(width, height, shape.step) + Specks::bytes(width, height);
 }
 
 void Decision::forget() {
   texture_.forget();
   noise_.forget();
+  hard_.forget();
   frames_ = 0;
   grey_ = colours_ == Colours::grey;
 }
 
 void Decision::change_scene(bool returns) {
   if (!left_) {
-    left_ = Statistics{texture_, noise_, frames_};
+    left_ = Statistics{texture_, noise_, hard_.known(), frames_};
     returns = false;
   } else {
     std::swap(left_->texture, texture_);
     std::swap(left_->noise, noise_);
+    std::swap(left_->hard, hard_.known());
     std::swap(left_->frames, frames_);
   }
   if (!returns) forget();
@@ -223,28 +226,31 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     }
   }
   const bool learns = steps_.noise && !frame.fixed;
-  if (learns) noise_.remember(of_.mask.data());
   in_rows([&](int first, int size) {
     vote({of_.foreground.data() + shape_.offset(0), shape_.stride, shape_.width, shape_.height,
           shape_.reach},
          first, size, of_.mask.data());
   });
   uint8_t* const mask = of_.mask.data();
-  if (steps_.specks && shape_.reach > 0) {
-    const auto area = [&](double share) {
-      return static_cast<size_t>(share * static_cast<double>(shape_.pixels()));
-    };
-    specks_.take_out(mask, 255, area(constants().least_foreground), true);
-    specks_.take_out(mask, 0, area(constants().least_hole), false);
-  }
+  take_out_specks(255, constants().least_foreground);
+  take_out_specks(0, constants().least_hole);
   // Pixels around it may have overruled some.
   if (frame.ignored) frame.ignored->clear_rows(0, shape_.height, shape_.width, mask);
   if (learns) {
     in_rows([&](int first, int size) { learn(first, size); });
-    noise_.end_frame();
+    noise_.end_frame(mask);
   }
+  // Where a shadow was is no place to learn noise from. Much noise hides texture.
+  if (steps_.hard && !now_.means && knows_light() && !much_moves()) leave_hard_shadows();
   find_colour();
   ++frames_;
+}
+
+// share: of the picture.
+void Decision::take_out_specks(uint8_t colour, double share) {
+  if (!steps_.specks || shape_.reach == 0) return;
+  const double least = share * static_cast<double>(shape_.pixels());
+  specks_.take_out(of_.mask.data(), colour, static_cast<size_t>(least), colour == 255);
 }
 
 void Decision::find_colour() {
@@ -455,8 +461,7 @@ void Decision::explain_run(int y, int left, int right, int grid_row) {
     }
     p = end;
   }
-  if (steps_.light && !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground)
-    leave_shadows(run);
+  if (steps_.light && knows_light()) leave_shadows(run);
 }
 
 // Distances and limits of a run.
@@ -493,6 +498,35 @@ void Decision::look_around(Run* run) {
       rows[kPlacesAlong * c + i] = level_row(c, row) + run->left;
     }
   nearest_distance(middle.x, rows, static_cast<size_t>(run->count), shape_.step, run->nearest);
+}
+
+// Whether the background in another light is to be left out, and can be told.
+bool Decision::knows_light() const {
+  return !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground;
+}
+
+// Before a camera that shakes, what is seen is the background beside its place: it has the
+// background's texture, in any light.
+bool Decision::much_moves() const {
+  const auto cells = static_cast<size_t>(texture_.grid().rows * texture_.grid().cols);
+  size_t moving = 0;
+  for (size_t cell = 0; cell < cells; ++cell) moving += moves(cell);
+  return static_cast<double>(moving) > constants().hard.most_moving * static_cast<double>(cells);
+}
+
+void Decision::leave_hard_shadows() {
+  HardShadows::Planes planes;
+  for (int c = 0; c < kChannels; ++c) {
+    planes.x[c] = now_.frame.x[c].high;
+    planes.l[c] = level_row(c, 0);
+  }
+  planes.x_stride = static_cast<size_t>(shape_.width);
+  planes.l_stride = shape_.stride;
+  const bool marked = now_.frame.shadows == Shadows::marked;
+  const bool any =
+      hard_.take_out(planes, rgb_, black_, of_.mask.data(), marked ? of_.shaded.data() : nullptr);
+  // Outlines of shadows are left.
+  if (any) take_out_specks(255, constants().least_foreground);
 }
 
 void Decision::leave_shadows(const Run& run) {

@@ -14,6 +14,7 @@
 #include "core/base/large_vector.h"
 #include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
+#include "core/foreground/hard_shadows.h"
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/specks.h"
@@ -54,7 +55,8 @@ struct Comparison {
 //     it,
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
 //     foreground, too,
-//   - it belongs to a part that is too small; holes that are too small are foreground (Specks).
+//   - it belongs to a part that is too small; holes that are too small are foreground (Specks),
+//   - it belongs to a region in much less light (HardShadows; as find_shaded).
 // In much noise, means of 3 x 3 pixels are compared. Of samples of more than 8 bits a pixel's own
 // distance from L is that of whole samples; means, what is around, and light are compared in the
 // highest 8 bits, noise is learnt from them, and where the user's threshold is so low that these
@@ -140,6 +142,7 @@ class Decision {
   const DecisionConstants& constants() const { return steps_.constants; }
   bool moves(size_t cell) const { return now_.textures && texture_.moves(cell); }
   void clear_marks();
+  void take_out_specks(uint8_t colour, double share);
   void find_colour();
   // The mask's row y, or the nearest one.
   const uint8_t* mask_row(int y) const;
@@ -152,7 +155,10 @@ class Decision {
   void explain_run(int y, int left, int right, int grid_row);
   void look_at(Run* run);
   void look_around(Run* run);
+  bool knows_light() const;
+  bool much_moves() const;
   void leave_shadows(const Run& run);
+  void leave_hard_shadows();
   void learn(int first_row, int row_count);
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;
@@ -166,9 +172,11 @@ class Decision {
   bool grey_ = false;  // the newest frame is
   MovingTexture texture_;
   PixelNoise noise_;
+  HardShadows hard_;
   struct Statistics {
     MovingTexture texture;
     PixelNoise noise;
+    HardShadows::Known hard;
     int64_t frames;
   };
   std::optional<Statistics> left_;  // of the scene before

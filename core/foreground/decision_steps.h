@@ -3,6 +3,7 @@
 // docs/notebook/masks.md has what each step is worth, and what other constants would give.
 #pragma once
 
+#include "core/foreground/hard_shadows.h"
 #include "core/passes/shading.h"
 
 namespace qdmd {
@@ -53,6 +54,9 @@ struct DecisionConstants {
   // Levels: a background so bright in unit light is at least that: its samples were clipped.
   float at_end = 253;
 
+  // ---- HardShadows ----
+  HardShadowConstants hard;
+
   // ---- Specks ----
   // Parts of the mask below these shares of the picture are specks, and holes.
   double least_foreground = 1 / 4000.0, least_hole = 1 / 500.0;
@@ -65,6 +69,7 @@ struct DecisionSteps {
   bool light = true;    // find_shaded
   bool vote = true;
   bool specks = true;  // Specks; only after a vote
+  bool hard = true;    // HardShadows
   DecisionConstants constants = {};
 };
 

@@ -28,13 +28,6 @@ void PixelNoise::forget() {
   frames_ = 0;
 }
 
-void PixelNoise::remember(const uint8_t* mask) {
-  for (int y = 0; y < height_; ++y)
-    if (learns_from(y))
-      std::memcpy(before_.data() + static_cast<size_t>(y / kRows) * width_,
-                  mask + static_cast<size_t>(y) * width_, width_);
-}
-
 void PixelNoise::learn(int y, size_t left, size_t count, const uint16_t* squared,
                        const uint8_t* limit, const uint8_t* near, const uint8_t* now) {
   NoiseRates rates = rates_;
@@ -46,6 +39,14 @@ void PixelNoise::learn(int y, size_t left, size_t count, const uint16_t* squared
   learn_noise(squared, limit, near, now,
               before_.data() + static_cast<size_t>(y / kRows) * width_ + left, rates, count,
               row(y) + left);
+}
+
+void PixelNoise::end_frame(const uint8_t* mask) {
+  ++frames_;
+  for (int y = 0; y < height_; ++y)
+    if (learns_from(y))
+      std::memcpy(before_.data() + static_cast<size_t>(y / kRows) * width_,
+                  mask + static_cast<size_t>(y) * width_, width_);
 }
 
 }  // namespace qdmd

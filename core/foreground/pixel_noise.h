@@ -28,15 +28,13 @@ class PixelNoise {
   uint16_t* row(int y) { return mean_.data() + static_cast<size_t>(y) * width_; }
   // One row in a few of a frame says enough, other rows of each frame.
   bool learns_from(int y) const { return (y + frames_) % kRows == 0; }
-  // Before the next frame's mask takes the place of this one, width * height samples.
-  void remember(const uint8_t* mask);
   // Learns from pixels left .. left + count - 1 of such a row. squared: squared distances; limit:
   // the pixels' own limits in levels; near: 0 for background that is not next to foreground; now:
   // the mask. Each row is one thread's.
   void learn(int y, size_t left, size_t count, const uint16_t* squared, const uint8_t* limit,
              const uint8_t* near, const uint8_t* now);
-  // After the last row of a frame.
-  void end_frame() { ++frames_; }
+  // After the last row of a frame, with its mask, width * height samples.
+  void end_frame(const uint8_t* mask);
 
  private:
   static constexpr int kRows = 8;

@@ -230,8 +230,9 @@ TEST(SceneLowRate, TimeGoesOnByItsOwnClock) {
 // ---- Shadow ----
 
 TEST(SceneShadow, DarkensTheGroundOnceAndSaysWhere) {
-  for (const double depth : {0.0, 0.45, 1.0}) {
-    const std::string text = "shadow=" + std::to_string(depth) + ":length=1.5";
+  for (const auto& [depth, blue] : {std::pair{0.0, 0.0}, {0.45, 0.0}, {1.0, 0.0}, {0.8, 0.3}}) {
+    std::string text = "shadow=" + std::to_string(depth) + ":length=1.5";
+    if (blue > 0) text += ":blue=" + std::to_string(blue);
     // Persons whose shadows overlap.
     Scene with(options(160, 120, 5), text + ",bootstrap=12"),
         without(options(160, 120, 5), "bootstrap=12");
@@ -249,7 +250,8 @@ TEST(SceneShadow, DarkensTheGroundOnceAndSaysWhere) {
         ++in_frame;
         ASSERT_EQ(plain.labels[i], scene::kBackgroundLabel);
         for (size_t c = 0; c < 3; ++c) {
-          const double expected = shadow.background[3 * i + c] * (1 - depth);
+          const double taken = depth * (1 - blue * static_cast<double>(c) / 2);
+          const double expected = shadow.background[3 * i + c] * (1 - taken);
           ASSERT_NEAR(shadow.frame[3 * i + c], expected, 0.5 + 1e-9) << text;
         }
       }

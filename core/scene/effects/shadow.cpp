@@ -12,11 +12,15 @@ constexpr double kRise = 0.35;  // of the length: how far the shadow reaches up 
 class Shadow : public Effect {
  public:
   Shadow(Values values, const StreamSource&)
-      : depth_(values[0]), length_(values[1]), softness_(static_cast<int>(values[2])) {
-    for (size_t shade = 0; shade < dark_.size(); ++shade)
-      for (size_t level = 0; level < dark_[shade].size(); ++level)
-        dark_[shade][level] = to_level(static_cast<double>(level) *
-                                       (1 - depth_ * (static_cast<double>(shade) / 255)));
+      : length_(values[1]), softness_(static_cast<int>(values[2])) {
+    for (size_t c = 0; c < dark_.size(); ++c) {
+      // From red to blue, less is taken.
+      const double depth = values[0] * (1 - values[3] * static_cast<double>(c) / 2);
+      for (size_t shade = 0; shade < dark_[c].size(); ++shade)
+        for (size_t level = 0; level < dark_[c][shade].size(); ++level)
+          dark_[c][shade][level] = to_level(static_cast<double>(level) *
+                                            (1 - depth * (static_cast<double>(shade) / 255)));
+    }
   }
 
   void ground(FrameState& state, std::span<const Placement> placements) override {
@@ -67,13 +71,14 @@ class Shadow : public Effect {
       *state->shadow.at(x, y) = 255;
       if (!state->wants(kFrame)) continue;
       uint8_t* pixel = state->picture.at(x, y);
-      for (int c = 0; c < 3; ++c) pixel[c] = dark_[shade[x]][pixel[c]];
+      for (size_t c = 0; c < 3; ++c) pixel[c] = dark_[c][shade[x]][pixel[c]];
     }
   }
 
-  double depth_, length_;
+  double length_;
   int softness_;
-  std::array<std::array<uint8_t, 256>, 256> dark_{};  // by shade, 255 where the sun is gone
+  // By channel and shade, 255 where the sun is gone.
+  std::array<std::array<std::array<uint8_t, 256>, 256>, 3> dark_{};
   Plane shade_;
   int top_ = 0, bottom_ = 0;  // rows of the plane into which a shadow was cast
 };
@@ -83,6 +88,8 @@ constexpr Parameter kParameters[] = {
     {"length", "heights", 0.5, 0, 3, "length of the shadow over the height of the object"},
     {"softness", "px", 0, 0, 50, "how far the shadow's edge fades to either side of where it is",
      true},
+    {"blue", "of the depth", 0, 0, 1,
+     "by how much less the shadow takes of blue than of red: the sky's light is left"},
 };
 
 }  // namespace

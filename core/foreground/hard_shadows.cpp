@@ -1,0 +1,349 @@
+#include "core/foreground/hard_shadows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/foreground/mask_runs.h"
+#include "core/foreground/parts.h"
+
+namespace qdmd {
+namespace {
+
+// Of a block: bits of clipped channels are the lowest three.
+constexpr uint8_t kWhite = 8, kDark = 16;
+// Logs are whole numbers, so that sums do not depend on their order. Levels have quarters. What is
+// added to a level keeps noise near black small.
+constexpr double kLogs = 4096, kAdded = 2;
+constexpr int kQuarters = 4;
+// Regions of a frame: more are left in the mask.
+constexpr size_t kMostRegions = 4096;
+constexpr uint16_t kNoRegion = kMostRegions;
+// Blocks are compared with those so many to the right and below, at most.
+constexpr int kFar = 2;
+// Ratios of light: how dark, and the logs of G over R and B over G.
+constexpr int kDepths = 20, kHues = 10;
+constexpr size_t kRatios = size_t{kDepths} * kHues * kHues;
+
+int side_of(int step) { return 2 * step; }
+int along(int pixels, int step) { return (pixels + side_of(step) - 1) / side_of(step); }
+
+int whole(double log) { return static_cast<int>(std::lround(kLogs * log)); }
+
+size_t in_quarters(float level) {
+  return static_cast<size_t>(kQuarters * std::clamp(level, 0.0f, 255.0f) + 0.5f);
+}
+
+size_t ratio_at(int depth, int green, int blue) {
+  return (static_cast<size_t>(depth) * kHues + static_cast<size_t>(green)) * kHues +
+         static_cast<size_t>(blue);
+}
+
+// The sum over a ratio and those next to it.
+double around(const std::vector<float>& sums, size_t ratio) {
+  const int blue = static_cast<int>(ratio % kHues), green = static_cast<int>(ratio / kHues % kHues),
+            depth = static_cast<int>(ratio / kHues / kHues);
+  double sum = 0;
+  for (int d = std::max(depth - 1, 0); d <= std::min(depth + 1, kDepths - 1); ++d)
+    for (int g = std::max(green - 1, 0); g <= std::min(green + 1, kHues - 1); ++g)
+      for (int b = std::max(blue - 1, 0); b <= std::min(blue + 1, kHues - 1); ++b)
+        sum += sums[ratio_at(d, g, b)];
+  return sum;
+}
+
+}  // namespace
+
+HardShadows::HardShadows(int width, int height, int step, const HardShadowConstants& constants)
+    : constants_(constants),
+      width_(width),
+      height_(height),
+      side_(side_of(step)),
+      cols_(along(width, step)),
+      rows_(along(height, step)),
+      logs_(255 * kQuarters + 1),
+      steps_(logs_.size()) {
+  const size_t blocks = static_cast<size_t>(cols_) * static_cast<size_t>(rows_);
+  for (size_t quarters = 0; quarters < logs_.size(); ++quarters) {
+    const double level = static_cast<double>(quarters) / kQuarters + kAdded;
+    logs_[quarters] = static_cast<int16_t>(whole(std::log(level)));
+    steps_[quarters] = static_cast<int16_t>(whole(constants.step + constants.noise / level));
+  }
+  flags_.resize(blocks);
+  blocks_.resize(blocks);
+  part_.resize(blocks);
+  named_.resize(blocks);
+  regions_.reserve(std::min(kMostRegions, blocks));
+  known_ = {std::vector<float>(kRatios), std::vector<float>(kRatios)};
+}
+
+uint64_t HardShadows::bytes(int width, int height, int step) {
+  const uint64_t blocks = uint64_t(along(width, step)) * uint64_t(along(height, step));
+  return blocks * (sizeof(uint8_t) + sizeof(Block) + sizeof(uint32_t) + sizeof(uint16_t)) +
+         std::min<uint64_t>(kMostRegions, blocks) * sizeof(Region) + 2 * kRatios * sizeof(float);
+}
+
+void HardShadows::forget() {
+  std::fill(known_.both.begin(), known_.both.end(), 0.0f);
+  std::fill(known_.level.begin(), known_.level.end(), 0.0f);
+}
+
+// The mean of those of four pixels that are in the mask, of two at least.
+void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+                             const uint8_t* mask, int col, int row) {
+  std::array<int, 3> x{}, l{};
+  int count = 0;
+  for (int i = 0; i < 4; ++i) {
+    const auto at = static_cast<size_t>(std::min(col * side_ + i % 2 * (side_ / 2), width_ - 1)),
+               y = static_cast<size_t>(std::min(row * side_ + i / 2 * (side_ / 2), height_ - 1));
+    if (mask[y * static_cast<size_t>(width_) + at] == 0) continue;
+    ++count;
+    for (size_t c = 0; c < 3; ++c) {
+      x[c] += planes.x[c][y * planes.x_stride + at];
+      l[c] += planes.l[c][y * planes.l_stride + at];
+    }
+  }
+  if (count < 2) return;
+  const auto in_rgb = [&](const std::array<int, 3>& sum) {
+    const float share = 1 / static_cast<float>(count);
+    RgbColours::Pixel mean;
+    for (size_t c = 0; c < 3; ++c) mean[c] = static_cast<float>(sum[c]) * share;
+    if (rgb.converts()) return rgb.rgb(mean);
+    for (size_t c = 0; c < 3; ++c) mean[c] -= black[c];
+    return mean;
+  };
+  const RgbColours::Pixel lit = in_rgb(x), level = in_rgb(l);
+  Block& block = blocks_[index(col, row)];
+  uint8_t flags = kWhite;
+  int sum = 0, brightest = INT32_MIN;
+  block.step = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const size_t of_x = in_quarters(lit[c]);
+    block.x[c] = logs_[of_x];
+    block.l[c] = logs_[in_quarters(level[c])];
+    block.step = std::max(block.step, steps_[of_x]);
+    const int ratio = block.x[c] - block.l[c];
+    sum += ratio;
+    brightest = std::max(brightest, ratio);
+    if (level[c] >= static_cast<float>(constants_.clipped)) flags |= static_cast<uint8_t>(1 << c);
+  }
+  if (sum < -3 * whole(constants_.dark) && brightest < whole(constants_.dark / 6)) flags |= kDark;
+  flags_[index(col, row)] = flags;
+}
+
+// False where the mask is empty.
+bool HardShadows::read_blocks(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+                              const uint8_t* mask) {
+  std::fill(flags_.begin(), flags_.end(), uint8_t{0});
+  bool any = false;
+  for (int row = 0; row < rows_; ++row) {
+    const int top = row * side_, middle = std::min(top + side_ / 2, height_ - 1);
+    const uint8_t* const first = mask + static_cast<size_t>(top) * static_cast<size_t>(width_);
+    const uint8_t* const second = mask + static_cast<size_t>(middle) * static_cast<size_t>(width_);
+    int a = next_of(first, 0, width_, 255), b = next_of(second, 0, width_, 255);
+    while (std::min(a, b) < width_) {
+      any = true;
+      const int col = std::min(a, b) / side_, next = std::min((col + 1) * side_, width_);
+      read_block(planes, rgb, black, mask, col, row);
+      if (a < next) a = next_of(first, next, width_, 255);
+      if (b < next) b = next_of(second, next, width_, 255);
+    }
+  }
+  return any;
+}
+
+void HardShadows::join(size_t a, size_t b) {
+  const Block &one = blocks_[a], &other = blocks_[b];
+  const int step = std::max(one.step, other.step);
+  for (size_t c = 0; c < 3; ++c)
+    if (std::abs((one.x[c] - one.l[c]) - (other.x[c] - other.l[c])) >= step) return;
+  const auto named = [this](uint32_t block) -> uint32_t& { return part_[block]; };
+  const uint32_t first = part_of(static_cast<uint32_t>(a), named),
+                 second = part_of(static_cast<uint32_t>(b), named);
+  // The first block stands for all.
+  part_[std::max(first, second)] = std::min(first, second);
+}
+
+void HardShadows::find_regions() {
+  const auto cols = static_cast<size_t>(cols_);
+  for (size_t k = 0; k < flags_.size(); ++k) {
+    if ((flags_[k] & kDark) == 0) continue;
+    part_[k] = static_cast<uint32_t>(k);
+    if (k % cols > 0 && (flags_[k - 1] & kDark) != 0) join(k - 1, k);
+    if (k >= cols && (flags_[k - cols] & kDark) != 0) join(k - cols, k);
+  }
+  regions_.clear();
+  for (size_t k = 0; k < flags_.size(); ++k) {
+    if (flags_[k] == 0) continue;
+    named_[k] = kNoRegion;
+    if ((flags_[k] & kDark) == 0) continue;
+    const uint32_t part =
+        part_of(static_cast<uint32_t>(k), [this](uint32_t i) -> uint32_t& { return part_[i]; });
+    if (part != k) {
+      named_[k] = named_[part];
+    } else if (regions_.size() < regions_.capacity() && regions_.size() < kMostRegions) {
+      named_[k] = static_cast<uint16_t>(regions_.size());
+      regions_.push_back({});
+    }
+    if (named_[k] == kNoRegion) continue;
+    Region& region = regions_[named_[k]];
+    ++region.blocks;
+    for (size_t c = 0; c < 3; ++c) {
+      const int64_t ratio = blocks_[k].x[c] - blocks_[k].l[c];
+      region.ratio[c] += ratio;
+      region.squares += ratio * ratio;
+      region.clipped[c] += flags_[k] >> c & 1;
+    }
+  }
+}
+
+// Pairs of a block and those to the right and below: half of what each says goes to either's
+// region. A thing ends where its ratio of light changes with the background; so blocks of other
+// regions, and of none, count, too.
+void HardShadows::add_pairs(int col, int row) {
+  const size_t here = index(col, row);
+  const int edge = whole(constants_.edge);
+  for (int i = 0; i < 2 * kFar; ++i) {
+    const int right = i < kFar ? i + 1 : 0, down = i < kFar ? 0 : i - kFar + 1;
+    if (col + right >= cols_ || row + down >= rows_) continue;
+    const size_t there = index(col + right, row + down);
+    if (flags_[there] == 0 || (named_[here] == kNoRegion && named_[there] == kNoRegion)) continue;
+    int64_t both = 0, light = 0, level = 0, pairs = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      if (((flags_[here] | flags_[there]) >> c & 1) != 0) continue;
+      const int dx = std::clamp(blocks_[there].x[c] - blocks_[here].x[c], -edge, edge),
+                dl = std::clamp(blocks_[there].l[c] - blocks_[here].l[c], -edge, edge);
+      both += dx * dl, light += dx * dx, level += dl * dl, ++pairs;
+    }
+    for (const size_t block : {here, there}) {
+      if (named_[block] == kNoRegion) continue;
+      Region& region = regions_[named_[block]];
+      region.both += both, region.light += light, region.level += level, region.pairs += pairs;
+    }
+  }
+}
+
+// Whether the ratio of light may be that of the sky to the sun and the sky.
+bool HardShadows::is_lit(const Region& region) const {
+  const auto count = static_cast<double>(region.blocks);
+  const auto log_of = [&](size_t c) {
+    return static_cast<double>(region.ratio[c]) / count / kLogs;
+  };
+  const auto is_bound = [&](size_t c) {
+    return static_cast<double>(region.clipped[c]) > constants_.clipped_share * count;
+  };
+  double squares = static_cast<double>(region.squares) / count / (kLogs * kLogs);
+  for (size_t c = 0; c < 3; ++c) squares -= log_of(c) * log_of(c);
+  if (squares / 3 >= constants_.most_spread * constants_.most_spread) return false;
+  for (const auto& [red, blue] : {std::pair<size_t, size_t>{0, 1}, {1, 2}, {0, 2}}) {
+    const double bluer = log_of(blue) - log_of(red);
+    if (bluer < -(is_bound(red) && !is_bound(blue) ? constants_.redder_bound : constants_.redder) ||
+        bluer > (is_bound(blue) && !is_bound(red) ? constants_.bluer_bound : constants_.bluer))
+      return false;
+  }
+  return true;
+}
+
+size_t HardShadows::ratio_of(const Region& region) const {
+  const double width = kLogs * constants_.width * static_cast<double>(region.blocks);
+  const auto [r, g, b] = region.ratio;
+  const auto place = [&](double log, int middle, int count) {
+    return std::clamp(static_cast<int>(std::floor(log / width)) + middle, 0, count - 1);
+  };
+  return ratio_at(place(-static_cast<double>(r + g + b) / 3, 0, kDepths),
+                  place(static_cast<double>(g - r), kHues / 2, kHues),
+                  place(static_cast<double>(b - g), kHues / 2, kHues));
+}
+
+// Which regions are shadows; then those that are large add to what is known: outlines before a
+// camera that shakes are small, and follow the background.
+void HardShadows::decide() {
+  constexpr double kSquares = 2 * kLogs * kLogs;  // each pair was added twice
+  const auto is_large = [&](const Region& region) {
+    return static_cast<double>(region.blocks) >= constants_.least_blocks;
+  };
+  const auto level_of_region = [&](const Region& region) {
+    return static_cast<double>(region.level) / kSquares +
+           constants_.noise_of_pair * static_cast<double>(region.pairs) / 2;
+  };
+  for (Region& region : regions_) {
+    if (!is_large(region) || !is_lit(region)) continue;
+    const size_t ratio = ratio_of(region);
+    const double both = static_cast<double>(region.both) / kSquares,
+                 level = level_of_region(region);
+    const double known = (both + around(known_.both, ratio)) /
+                         (level + around(known_.level, ratio) + constants_.least_known);
+    const double variance = static_cast<double>(region.light) / (kLogs * kLogs) /
+                            static_cast<double>(std::max<int64_t>(region.pairs, 1));
+    const double trust = constants_.trust * variance + constants_.least_trust;
+    region.shadow = known > constants_.slope_of_ratio &&
+                    (both + trust * known) / (level + trust) > constants_.slope_of_region;
+  }
+  const auto kept = static_cast<float>(std::exp2(-1 / constants_.half_life));
+  for (size_t k = 0; k < kRatios; ++k) known_.both[k] *= kept, known_.level[k] *= kept;
+  for (const Region& region : regions_) {
+    if (static_cast<double>(region.blocks) < 4 * constants_.least_blocks) continue;
+    const size_t ratio = ratio_of(region);
+    known_.both[ratio] += static_cast<float>(static_cast<double>(region.both) / kSquares);
+    known_.level[ratio] += static_cast<float>(level_of_region(region));
+  }
+}
+
+bool HardShadows::is_shadow(size_t block) const {
+  return flags_[block] != 0 && named_[block] != kNoRegion && regions_[named_[block]].shadow;
+}
+
+// Small regions are neither.
+bool HardShadows::is_thing(size_t block) const {
+  if (flags_[block] == 0) return false;
+  if (named_[block] == kNoRegion) return true;
+  const Region& region = regions_[named_[block]];
+  return !region.shadow && static_cast<double>(region.blocks) >= constants_.least_blocks;
+}
+
+bool HardShadows::next_to_thing(int col, int row) const {
+  for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
+    for (int x = std::max(col - 1, 0); x <= std::min(col + 1, cols_ - 1); ++x)
+      if (is_thing(index(x, y))) return true;
+  return false;
+}
+
+bool HardShadows::clear(int col, int row, uint8_t* mask, uint8_t* marks) const {
+  bool any = false;
+  const int right = std::min((col + 1) * side_, width_),
+            bottom = std::min((row + 1) * side_, height_);
+  for (int y = row * side_; y < bottom; ++y)
+    for (int x = col * side_; x < right; ++x) {
+      const size_t p =
+          static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
+      any |= mask[p] != 0;
+      if (marks) marks[p] |= mask[p];
+      mask[p] = 0;
+    }
+  return any;
+}
+
+bool HardShadows::take_out(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+                           uint8_t* mask, uint8_t* marks) {
+  if (!read_blocks(planes, rgb, black, mask)) return false;
+  find_regions();
+  if (regions_.empty()) return false;
+  for (int row = 0; row < rows_; ++row)
+    for (int col = 0; col < cols_; ++col)
+      if (flags_[index(col, row)] != 0) add_pairs(col, row);
+  decide();
+  bool any = false;
+  for (int row = 0; row < rows_; ++row)
+    for (int col = 0; col < cols_; ++col) {
+      if (!is_shadow(index(col, row))) continue;
+      any |= clear(col, row, mask, marks);
+      // What is left of it at its border.
+      for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
+        for (int x = std::max(col - 1, 0); x <= std::min(col + 1, cols_ - 1); ++x) {
+          const size_t beside = index(x, y);
+          if (!is_shadow(beside) && !is_thing(beside) && !next_to_thing(x, y))
+            any |= clear(x, y, mask, marks);
+        }
+    }
+  return any;
+}
+
+}  // namespace qdmd
