@@ -220,7 +220,9 @@ class Reference {
     for (auto& [place, known] : known_)
       for (double& sum : known) sum *= std::exp2(-1 / all_.half_life);
     for (const Sums& sums : regions) {
-      if (sums.blocks < 4 * all_.least_blocks) continue;
+      if (sums.blocks < all_.least_blocks ||
+          (sums.blocks < 4 * all_.least_blocks && sums.both > 0.3 * sums.level))
+        continue;
       auto& known = known_[ratio_of(sums)];
       known[0] += sums.both;
       known[1] += sums.level + all_.noise_of_pair * sums.pairs;
