@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/foreground/hard_shadows.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Hard shadows: regions of a mask that are the background in much less light.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // Hard shadows: what is taken out of a mask, against a slow reference; floors with shadows and
 // things; a simulated street in the sun.
 #include "core/foreground/hard_shadows.h"

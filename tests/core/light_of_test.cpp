@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
 // The light of frames of cells: gains that are known are found, and what moves is none.
 #include "core/learn/robust/light.h"
 
