@@ -19,9 +19,6 @@ constexpr int kQuarters = 4;
 // Regions of a frame: more are left in the mask.
 constexpr size_t kMostRegions = 4096;
 constexpr uint16_t kNoRegion = kMostRegions;
-// Regions of so many times the least size may say that there are shadows; smaller ones only with a
-// slope up to the second.
-constexpr double kTeaching = 4, kFollows = 0.3;
 // Blocks are compared with those so many to the right and below, at most.
 constexpr int kFar = 2;
 // Ratios of light: how dark, and the logs of G over R and B over G.
@@ -284,9 +281,10 @@ void HardShadows::decide() {
   const auto kept = static_cast<float>(std::exp2(-1 / constants_.half_life));
   for (size_t k = 0; k < kRatios; ++k) known_.both[k] *= kept, known_.level[k] *= kept;
   for (const Region& region : regions_) {
-    const bool small = static_cast<double>(region.blocks) < kTeaching * constants_.least_blocks;
+    const bool small =
+        static_cast<double>(region.blocks) < constants_.teaching * constants_.least_blocks;
     const bool follows =
-        static_cast<double>(region.both) > kFollows * static_cast<double>(region.level);
+        static_cast<double>(region.both) > constants_.follows * static_cast<double>(region.level);
     if (!is_large(region) || (small && follows)) continue;
     const size_t ratio = ratio_of(region);
     known_.both[ratio] += static_cast<float>(static_cast<double>(region.both) / kSquares);

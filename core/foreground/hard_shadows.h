@@ -35,6 +35,9 @@ struct HardShadowConstants {
   // besides a fixed amount. It is worth nothing until it exceeds `least_known`. A pair of blocks
   // has as much noise in L.
   double trust = 100, least_trust = 0.05, least_known = 0.5, noise_of_pair = 0.0005;
+  // Regions of so many times the least size may say that there are shadows; smaller ones only with
+  // a slope up to the second.
+  double teaching = 4, follows = 0.3;
   // Width of the ratios that are told apart, in logs, and frames until half of what is known of
   // them is forgotten.
   double width = 0.12, half_life = 350;

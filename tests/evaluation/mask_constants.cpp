@@ -31,7 +31,11 @@ std::vector<Constant> constants() {
       all.light.*member *= static_cast<float>(factor);
     };
   };
+  const auto of_hard = [](double HardShadowConstants::*member) {
+    return [=](DecisionConstants& all, double factor) { all.hard.*member *= factor; };
+  };
   using All = DecisionConstants;
+  using Hard = HardShadowConstants;
   return {
       {"mean_distances", of(&All::mean_distances)},
       {"noise_samples", of(&All::noise_samples)},
@@ -65,6 +69,28 @@ std::vector<Constant> constants() {
       {"light.around", of_light(&LightRange::around)},
       {"light.least_rest", of_light(&LightRange::least_rest)},
       {"light.of_level", of_light(&LightRange::of_level)},
+      {"hard.dark", of_hard(&Hard::dark)},
+      {"hard.step", of_hard(&Hard::step)},
+      {"hard.noise", of_hard(&Hard::noise)},
+      {"hard.least_blocks", of_hard(&Hard::least_blocks)},
+      {"hard.most_spread", of_hard(&Hard::most_spread)},
+      {"hard.clipped_share", of_hard(&Hard::clipped_share)},
+      {"hard.redder", of_hard(&Hard::redder)},
+      {"hard.bluer", of_hard(&Hard::bluer)},
+      {"hard.redder_bound", of_hard(&Hard::redder_bound)},
+      {"hard.bluer_bound", of_hard(&Hard::bluer_bound)},
+      {"hard.edge", of_hard(&Hard::edge)},
+      {"hard.slope_of_ratio", of_hard(&Hard::slope_of_ratio)},
+      {"hard.slope_of_region", of_hard(&Hard::slope_of_region)},
+      {"hard.trust", of_hard(&Hard::trust)},
+      {"hard.least_trust", of_hard(&Hard::least_trust)},
+      {"hard.least_known", of_hard(&Hard::least_known)},
+      {"hard.noise_of_pair", of_hard(&Hard::noise_of_pair)},
+      {"hard.teaching", of_hard(&Hard::teaching)},
+      {"hard.follows", of_hard(&Hard::follows)},
+      {"hard.width", of_hard(&Hard::width)},
+      {"hard.half_life", of_hard(&Hard::half_life)},
+      {"hard.most_moving", of_hard(&Hard::most_moving)},
   };
 }
 
@@ -169,11 +195,15 @@ int main(int argc, char** argv) try {
   std::vector<double> factors = {0.7, 1.4};
   app.add_option("--dataset", datasets, "folder of sequences; again for more")->required();
   app.add_option("--factors", factors, "what constants are multiplied by")->delimiter(',');
+  std::string only;
+  app.add_option("--only", only, "constants whose names begin so");
   CLI11_PARSE(app, argc, argv);
 
   // The first set is what the element has.
   std::vector<DecisionConstants> sets(1);
-  const std::vector<Constant> all = constants();
+  std::vector<Constant> all = constants();
+  std::erase_if(
+      all, [&](const Constant& constant) { return !std::string(constant.name).starts_with(only); });
   for (const Constant& constant : all)
     for (double factor : factors) {
       sets.emplace_back();
