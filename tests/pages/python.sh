@@ -4,8 +4,10 @@
 set -euo pipefail
 source "$(dirname "$0")/common.sh"
 tests/install-dependencies.sh build test python opencv docs
-meson setup --reconfigure build -Dpython=auto >/dev/null
-ninja -C build python/all >/dev/null
+# Without a configured folder everything is built.
+mapfile -t module < <([ ! -f build/build.ninja ] || ninja -C build -t targets all |
+  sed -nE 's,^(python/qdmd/[^/:]+\.(so|py|pyi|typed)):.*,\1,p')
+build "${module[@]}"
 find_sequences
 video=$(street_video)
 [ -n "$video" ] || { echo "Run examples/demo.sh first: it fetches the video." >&2; exit 1; }
