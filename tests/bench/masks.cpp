@@ -230,14 +230,14 @@ void add_all(const Size& size) {
   const std::pair<const char*, bool DecisionSteps::*> steps[] = {
       {"noise", &DecisionSteps::noise},   {"texture", &DecisionSteps::texture},
       {"light", &DecisionSteps::light},   {"vote", &DecisionSteps::vote},
-      {"specks", &DecisionSteps::specks},
+      {"specks", &DecisionSteps::specks}, {"hard", &DecisionSteps::hard},
   };
   for (const auto& [name, step] : steps) {
     DecisionSteps without;
     without.*step = false;
     add_decision(std::string("without_") + name, size, without);
   }
-  add_decision("alone", size, {false, false, false, false, false, false});
+  add_decision("alone", size, {false, false, false, false, false, false, false});
   const auto half = std::make_shared<IgnoredAreas>();
   half->add({0, 0, size.width, size.height / 2});
   add_decision("half_ignored", size, {}, false, half);
