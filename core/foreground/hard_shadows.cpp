@@ -16,6 +16,7 @@ constexpr uint8_t kWhite = 8, kDark = 16;
 // added to a level keeps noise near black small.
 constexpr double kLogs = 4096, kAdded = 2;
 constexpr int kQuarters = 4;
+constexpr size_t kLevels = 255 * kQuarters + 1;
 // Regions of a frame: more are left in the mask.
 constexpr size_t kMostRegions = 4096;
 constexpr uint16_t kNoRegion = kMostRegions;
@@ -60,8 +61,8 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
       side_(side_of(step)),
       cols_(along(width, step)),
       rows_(along(height, step)),
-      logs_(255 * kQuarters + 1),
-      steps_(logs_.size()) {
+      logs_(kLevels),
+      steps_(kLevels) {
   const size_t blocks = static_cast<size_t>(cols_) * static_cast<size_t>(rows_);
   for (size_t quarters = 0; quarters < logs_.size(); ++quarters) {
     const double level = static_cast<double>(quarters) / kQuarters + kAdded;
@@ -79,7 +80,8 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
 uint64_t HardShadows::bytes(int width, int height, int step) {
   const uint64_t blocks = uint64_t(along(width, step)) * uint64_t(along(height, step));
   return blocks * (sizeof(uint8_t) + sizeof(Block) + sizeof(uint32_t) + sizeof(uint16_t)) +
-         std::min<uint64_t>(kMostRegions, blocks) * sizeof(Region) + 2 * kRatios * sizeof(float);
+         std::min<uint64_t>(kMostRegions, blocks) * sizeof(Region) + 2 * kRatios * sizeof(float) +
+         2 * kLevels * sizeof(int16_t);
 }
 
 void HardShadows::forget() {
