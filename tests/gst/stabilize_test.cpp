@@ -153,7 +153,7 @@ TEST(Stabilize, ACameraThatGoesOnIsSaidSo) {
 
 TEST(Stabilize, WithoutRoomThereIsOneWarning) {
   // Enough for the window, not for two.
-  EXPECT_EQ(run("basic,jitter=3", "max-memory=9700000 n-threads=2 output=mask", 60).warnings, 1);
+  EXPECT_EQ(run("basic,jitter=3", "max-memory=10500000 n-threads=2 output=mask", 60).warnings, 1);
   EXPECT_EQ(run("basic,jitter=3", "output=mask", 60).warnings, 0);
 }
 
