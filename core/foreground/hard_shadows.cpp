@@ -62,7 +62,9 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
       cols_(along(width, step)),
       rows_(along(height, step)),
       logs_(kLevels),
-      steps_(kLevels) {
+      steps_(kLevels),
+      dark_(whole(constants.dark)),
+      hardly_dark_(whole(constants.dark / 6)) {
   const size_t blocks = static_cast<size_t>(cols_) * static_cast<size_t>(rows_);
   for (size_t quarters = 0; quarters < logs_.size(); ++quarters) {
     const double level = static_cast<double>(quarters) / kQuarters + kAdded;
@@ -70,6 +72,7 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
     steps_[quarters] = static_cast<int16_t>(whole(constants.step + constants.noise / level));
   }
   flags_.resize(blocks);
+  white_.reserve(blocks);
   blocks_.resize(blocks);
   part_.resize(blocks);
   named_.resize(blocks);
@@ -79,7 +82,7 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
 
 uint64_t HardShadows::bytes(int width, int height, int step) {
   const uint64_t blocks = uint64_t(along(width, step)) * uint64_t(along(height, step));
-  return blocks * (sizeof(uint8_t) + sizeof(Block) + sizeof(uint32_t) + sizeof(uint16_t)) +
+  return blocks * (sizeof(uint8_t) + sizeof(Block) + 2 * sizeof(uint32_t) + sizeof(uint16_t)) +
          std::min<uint64_t>(kMostRegions, blocks) * sizeof(Region) + 2 * kRatios * sizeof(float) +
          2 * kLevels * sizeof(int16_t);
 }
@@ -128,29 +131,29 @@ void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const 
     brightest = std::max(brightest, ratio);
     if (level[c] >= static_cast<float>(constants_.clipped)) flags |= static_cast<uint8_t>(1 << c);
   }
-  if (sum < -3 * whole(constants_.dark) && brightest < whole(constants_.dark / 6)) flags |= kDark;
+  if (sum < -3 * dark_ && brightest < hardly_dark_) flags |= kDark;
   flags_[index(col, row)] = flags;
+  white_.push_back(static_cast<uint32_t>(index(col, row)));
 }
 
-// False where the mask is empty.
+// False where no block is in the mask.
 bool HardShadows::read_blocks(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
                               const uint8_t* mask) {
-  std::fill(flags_.begin(), flags_.end(), uint8_t{0});
-  bool any = false;
+  for (const uint32_t block : white_) flags_[block] = 0;
+  white_.clear();
   for (int row = 0; row < rows_; ++row) {
     const int top = row * side_, middle = std::min(top + side_ / 2, height_ - 1);
     const uint8_t* const first = mask + static_cast<size_t>(top) * static_cast<size_t>(width_);
     const uint8_t* const second = mask + static_cast<size_t>(middle) * static_cast<size_t>(width_);
     int a = next_of(first, 0, width_, 255), b = next_of(second, 0, width_, 255);
     while (std::min(a, b) < width_) {
-      any = true;
       const int col = std::min(a, b) / side_, next = std::min((col + 1) * side_, width_);
       read_block(planes, rgb, black, mask, col, row);
       if (a < next) a = next_of(first, next, width_, 255);
       if (b < next) b = next_of(second, next, width_, 255);
     }
   }
-  return any;
+  return !white_.empty();
 }
 
 void HardShadows::join(size_t a, size_t b) {
@@ -167,19 +170,17 @@ void HardShadows::join(size_t a, size_t b) {
 
 void HardShadows::find_regions() {
   const auto cols = static_cast<size_t>(cols_);
-  for (size_t k = 0; k < flags_.size(); ++k) {
+  for (const uint32_t k : white_) {
     if ((flags_[k] & kDark) == 0) continue;
-    part_[k] = static_cast<uint32_t>(k);
+    part_[k] = k;
     if (k % cols > 0 && (flags_[k - 1] & kDark) != 0) join(k - 1, k);
     if (k >= cols && (flags_[k - cols] & kDark) != 0) join(k - cols, k);
   }
   regions_.clear();
-  for (size_t k = 0; k < flags_.size(); ++k) {
-    if (flags_[k] == 0) continue;
+  for (const uint32_t k : white_) {
     named_[k] = kNoRegion;
     if ((flags_[k] & kDark) == 0) continue;
-    const uint32_t part =
-        part_of(static_cast<uint32_t>(k), [this](uint32_t i) -> uint32_t& { return part_[i]; });
+    const uint32_t part = part_of(k, [this](uint32_t i) -> uint32_t& { return part_[i]; });
     if (part != k) {
       named_[k] = named_[part];
     } else if (regions_.size() < regions_.capacity() && regions_.size() < kMostRegions) {
@@ -201,8 +202,8 @@ void HardShadows::find_regions() {
 // Pairs of a block and those to the right and below: half of what each says goes to either's
 // region. A thing ends where its ratio of light changes with the background; so blocks of other
 // regions, and of none, count, too.
-void HardShadows::add_pairs(int col, int row) {
-  const size_t here = index(col, row);
+void HardShadows::add_pairs(size_t here) {
+  const int col = static_cast<int>(here) % cols_, row = static_cast<int>(here) / cols_;
   const int edge = whole(constants_.edge);
   for (int i = 0; i < 2 * kFar; ++i) {
     const int right = i < kFar ? i + 1 : 0, down = i < kFar ? 0 : i - kFar + 1;
@@ -328,28 +329,29 @@ bool HardShadows::clear(int col, int row, uint8_t* mask, uint8_t* marks) const {
   return any;
 }
 
+// The block, and what is left of the shadow at its border.
+bool HardShadows::clear_shadow(size_t block, uint8_t* mask, uint8_t* marks) const {
+  const int col = static_cast<int>(block) % cols_, row = static_cast<int>(block) / cols_;
+  bool any = clear(col, row, mask, marks);
+  for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
+    for (int x = std::max(col - 1, 0); x <= std::min(col + 1, cols_ - 1); ++x) {
+      const size_t beside = index(x, y);
+      if (!is_shadow(beside) && !is_thing(beside) && !next_to_thing(x, y))
+        any |= clear(x, y, mask, marks);
+    }
+  return any;
+}
+
 bool HardShadows::take_out(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
                            uint8_t* mask, uint8_t* marks) {
   if (!read_blocks(planes, rgb, black, mask)) return false;
   find_regions();
   if (regions_.empty()) return false;
-  for (int row = 0; row < rows_; ++row)
-    for (int col = 0; col < cols_; ++col)
-      if (flags_[index(col, row)] != 0) add_pairs(col, row);
+  for (const uint32_t block : white_) add_pairs(block);
   decide();
   bool any = false;
-  for (int row = 0; row < rows_; ++row)
-    for (int col = 0; col < cols_; ++col) {
-      if (!is_shadow(index(col, row))) continue;
-      any |= clear(col, row, mask, marks);
-      // What is left of it at its border.
-      for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
-        for (int x = std::max(col - 1, 0); x <= std::min(col + 1, cols_ - 1); ++x) {
-          const size_t beside = index(x, y);
-          if (!is_shadow(beside) && !is_thing(beside) && !next_to_thing(x, y))
-            any |= clear(x, y, mask, marks);
-        }
-    }
+  for (const uint32_t block : white_)
+    if (is_shadow(block)) any |= clear_shadow(block, mask, marks);
   return any;
 }
 

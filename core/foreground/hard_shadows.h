@@ -94,10 +94,11 @@ class HardShadows {
                   const uint8_t* mask, int col, int row);
   void join(size_t a, size_t b);
   void find_regions();
-  void add_pairs(int col, int row);
+  void add_pairs(size_t block);
   bool is_lit(const Region& region) const;
   size_t ratio_of(const Region& region) const;
   void decide();
+  bool clear_shadow(size_t block, uint8_t* mask, uint8_t* marks) const;
   bool is_thing(size_t block) const;
   bool is_shadow(size_t block) const;
   bool next_to_thing(int col, int row) const;
@@ -106,7 +107,9 @@ class HardShadows {
   HardShadowConstants constants_;
   int width_, height_, side_, cols_, rows_;
   std::vector<int16_t> logs_, steps_;  // of quarters of a level
+  int dark_, hardly_dark_;             // logs of ratios
   std::vector<uint8_t> flags_;         // by block
+  std::vector<uint32_t> white_;        // blocks in the mask, in order: few of all
   std::vector<Block> blocks_;
   std::vector<uint32_t> part_;   // another block of its region (parts.h)
   std::vector<uint16_t> named_;  // the region
