@@ -31,10 +31,6 @@ int along(int pixels, int step) { return (pixels + side_of(step) - 1) / side_of(
 
 int whole(double log) { return static_cast<int>(std::lround(kLogs * log)); }
 
-size_t in_quarters(float level) {
-  return static_cast<size_t>(kQuarters * std::clamp(level, 0.0f, 255.0f) + 0.5f);
-}
-
 size_t ratio_at(int depth, int green, int blue) {
   return (static_cast<size_t>(depth) * kHues + static_cast<size_t>(green)) * kHues +
          static_cast<size_t>(blue);
@@ -64,7 +60,9 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
       logs_(kLevels),
       steps_(kLevels),
       dark_(whole(constants.dark)),
-      hardly_dark_(whole(constants.dark / 6)) {
+      hardly_dark_(whole(constants.dark / 6)),
+      edge_(whole(constants.edge)),
+      clipped_(static_cast<int>(kQuarters * constants.clipped)) {
   const size_t blocks = static_cast<size_t>(cols_) * static_cast<size_t>(rows_);
   for (size_t quarters = 0; quarters < logs_.size(); ++quarters) {
     const double level = static_cast<double>(quarters) / kQuarters + kAdded;
@@ -92,48 +90,62 @@ void HardShadows::forget() {
   std::fill(known_.level.begin(), known_.level.end(), 0.0f);
 }
 
-// The mean of those of four pixels that are in the mask, of two at least.
-void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
-                             const uint8_t* mask, int col, int row) {
-  std::array<int, 3> x{}, l{};
-  int count = 0;
-  for (int i = 0; i < 4; ++i) {
-    const auto at = static_cast<size_t>(std::min(col * side_ + i % 2 * (side_ / 2), width_ - 1)),
-               y = static_cast<size_t>(std::min(row * side_ + i / 2 * (side_ / 2), height_ - 1));
-    if (mask[y * static_cast<size_t>(width_) + at] == 0) continue;
-    ++count;
-    for (size_t c = 0; c < 3; ++c) {
-      x[c] += planes.x[c][y * planes.x_stride + at];
-      l[c] += planes.l[c][y * planes.l_stride + at];
-    }
-  }
-  if (count < 2) return;
-  const auto in_rgb = [&](const std::array<int, 3>& sum) {
+// Quarters of levels of R, G and B, of the mean of two to four samples.
+std::array<int, 3> HardShadows::quarters_of(const std::array<int, 3>& sum, int count,
+                                            const RgbColours& rgb, const uint8_t black[3]) const {
+  std::array<int, 3> quarters;
+  if (rgb.converts()) {
     const float share = 1 / static_cast<float>(count);
     RgbColours::Pixel mean;
     for (size_t c = 0; c < 3; ++c) mean[c] = static_cast<float>(sum[c]) * share;
-    if (rgb.converts()) return rgb.rgb(mean);
-    for (size_t c = 0; c < 3; ++c) mean[c] -= black[c];
-    return mean;
-  };
-  const RgbColours::Pixel lit = in_rgb(x), level = in_rgb(l);
-  Block& block = blocks_[index(col, row)];
+    mean = rgb.rgb(mean);
+    for (size_t c = 0; c < 3; ++c) quarters[c] = static_cast<int>(kQuarters * mean[c] + 0.5f);
+  } else {
+    const int thirds = count == 2 ? 6 : count == 3 ? 4 : 3;  // of quarters
+    for (size_t c = 0; c < 3; ++c) quarters[c] = (thirds * sum[c] + 1) / 3 - kQuarters * black[c];
+  }
+  for (int& of : quarters) of = std::clamp(of, 0, static_cast<int>(kLevels) - 1);
+  return quarters;
+}
+
+// The mean of those of four pixels that are in the mask, of two at least.
+void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+                             const uint8_t* mask, int col, int row) {
+  const auto left = static_cast<size_t>(col * side_), top = static_cast<size_t>(row * side_);
+  const size_t right =
+                   std::min(left + static_cast<size_t>(side_ / 2), static_cast<size_t>(width_ - 1)),
+               bottom =
+                   std::min(top + static_cast<size_t>(side_ / 2), static_cast<size_t>(height_ - 1));
+  std::array<int, 3> x{}, l{};
+  int count = 0;
+  for (const size_t y : {top, bottom})
+    for (const size_t at : {left, right}) {
+      if (mask[y * static_cast<size_t>(width_) + at] == 0) continue;
+      ++count;
+      for (size_t c = 0; c < 3; ++c) {
+        x[c] += planes.x[c][y * planes.x_stride + at];
+        l[c] += planes.l[c][y * planes.l_stride + at];
+      }
+    }
+  if (count < 2) return;
+  const std::array<int, 3> lit = quarters_of(x, count, rgb, black),
+                           level = quarters_of(l, count, rgb, black);
+  const size_t here = index(col, row);
+  Block& block = blocks_[here];
   uint8_t flags = kWhite;
   int sum = 0, brightest = INT32_MIN;
-  block.step = 0;
+  block.step = steps_[static_cast<size_t>(std::min({lit[0], lit[1], lit[2]}))];
   for (size_t c = 0; c < 3; ++c) {
-    const size_t of_x = in_quarters(lit[c]);
-    block.x[c] = logs_[of_x];
-    block.l[c] = logs_[in_quarters(level[c])];
-    block.step = std::max(block.step, steps_[of_x]);
+    block.x[c] = logs_[static_cast<size_t>(lit[c])];
+    block.l[c] = logs_[static_cast<size_t>(level[c])];
     const int ratio = block.x[c] - block.l[c];
     sum += ratio;
     brightest = std::max(brightest, ratio);
-    if (level[c] >= static_cast<float>(constants_.clipped)) flags |= static_cast<uint8_t>(1 << c);
+    if (level[c] >= clipped_) flags |= static_cast<uint8_t>(1 << c);
   }
   if (sum < -3 * dark_ && brightest < hardly_dark_) flags |= kDark;
-  flags_[index(col, row)] = flags;
-  white_.push_back(static_cast<uint32_t>(index(col, row)));
+  flags_[here] = flags;
+  white_.push_back(static_cast<uint32_t>(here));
 }
 
 // False where no block is in the mask.
@@ -149,8 +161,11 @@ bool HardShadows::read_blocks(const Planes& planes, const RgbColours& rgb, const
     while (std::min(a, b) < width_) {
       const int col = std::min(a, b) / side_, next = std::min((col + 1) * side_, width_);
       read_block(planes, rgb, black, mask, col, row);
-      if (a < next) a = next_of(first, next, width_, 255);
-      if (b < next) b = next_of(second, next, width_, 255);
+      const auto go_on = [&](const uint8_t* in, int from) {
+        if (from >= next) return from;
+        return next < width_ && in[next] != 0 ? next : next_of(in, next, width_, 255);
+      };
+      a = go_on(first, a), b = go_on(second, b);
     }
   }
   return !white_.empty();
@@ -200,29 +215,47 @@ void HardShadows::find_regions() {
 }
 
 // Pairs of a block and those to the right and below: half of what each says goes to either's
-// region. A thing ends where its ratio of light changes with the background; so blocks of other
-// regions, and of none, count, too.
+// region, if it is judged. A thing ends where its ratio of light changes with the background; so
+// blocks of other regions, and of none, count, too.
 void HardShadows::add_pairs(size_t here) {
   const int col = static_cast<int>(here) % cols_, row = static_cast<int>(here) / cols_;
-  const int edge = whole(constants_.edge);
+  const auto judged = [this](size_t block) -> Region* {
+    if (flags_[block] == 0 || named_[block] == kNoRegion) return nullptr;
+    Region& region = regions_[named_[block]];
+    return region.judged ? &region : nullptr;
+  };
+  Region* const own = judged(here);
   for (int i = 0; i < 2 * kFar; ++i) {
     const int right = i < kFar ? i + 1 : 0, down = i < kFar ? 0 : i - kFar + 1;
     if (col + right >= cols_ || row + down >= rows_) continue;
     const size_t there = index(col + right, row + down);
-    if (flags_[there] == 0 || (named_[here] == kNoRegion && named_[there] == kNoRegion)) continue;
+    if (flags_[there] == 0) continue;
+    Region* const other = judged(there);
+    if (!own && !other) continue;
     int64_t both = 0, light = 0, level = 0, pairs = 0;
     for (size_t c = 0; c < 3; ++c) {
       if (((flags_[here] | flags_[there]) >> c & 1) != 0) continue;
-      const int dx = std::clamp(blocks_[there].x[c] - blocks_[here].x[c], -edge, edge),
-                dl = std::clamp(blocks_[there].l[c] - blocks_[here].l[c], -edge, edge);
+      const int dx = std::clamp(blocks_[there].x[c] - blocks_[here].x[c], -edge_, edge_),
+                dl = std::clamp(blocks_[there].l[c] - blocks_[here].l[c], -edge_, edge_);
       both += dx * dl, light += dx * dx, level += dl * dl, ++pairs;
     }
-    for (const size_t block : {here, there}) {
-      if (named_[block] == kNoRegion) continue;
-      Region& region = regions_[named_[block]];
-      region.both += both, region.light += light, region.level += level, region.pairs += pairs;
+    for (Region* region : {own, other}) {
+      if (!region) continue;
+      region->both += both, region->light += light, region->level += level;
+      region->pairs += pairs;
     }
   }
+}
+
+bool HardShadows::is_large(const Region& region) const {
+  return static_cast<double>(region.blocks) >= constants_.least_blocks;
+}
+
+// False where no region can be a shadow.
+bool HardShadows::find_judged() {
+  bool any = false;
+  for (Region& region : regions_) any |= region.judged = is_large(region) && is_lit(region);
+  return any;
 }
 
 // Whether the ratio of light may be that of the sky to the sun and the sky.
@@ -261,15 +294,12 @@ size_t HardShadows::ratio_of(const Region& region) const {
 // camera that shakes are small, and follow the background.
 void HardShadows::decide() {
   constexpr double kSquares = 2 * kLogs * kLogs;  // each pair was added twice
-  const auto is_large = [&](const Region& region) {
-    return static_cast<double>(region.blocks) >= constants_.least_blocks;
-  };
   const auto level_of_region = [&](const Region& region) {
     return static_cast<double>(region.level) / kSquares +
            constants_.noise_of_pair * static_cast<double>(region.pairs) / 2;
   };
   for (Region& region : regions_) {
-    if (!is_large(region) || !is_lit(region)) continue;
+    if (!region.judged) continue;
     const size_t ratio = ratio_of(region);
     const double both = static_cast<double>(region.both) / kSquares,
                  level = level_of_region(region);
@@ -288,7 +318,7 @@ void HardShadows::decide() {
         static_cast<double>(region.blocks) < constants_.teaching * constants_.least_blocks;
     const bool follows =
         static_cast<double>(region.both) > constants_.follows * static_cast<double>(region.level);
-    if (!is_large(region) || (small && follows)) continue;
+    if (!region.judged || (small && follows)) continue;
     const size_t ratio = ratio_of(region);
     known_.both[ratio] += static_cast<float>(static_cast<double>(region.both) / kSquares);
     known_.level[ratio] += static_cast<float>(level_of_region(region));
@@ -304,7 +334,7 @@ bool HardShadows::is_thing(size_t block) const {
   if (flags_[block] == 0) return false;
   if (named_[block] == kNoRegion) return true;
   const Region& region = regions_[named_[block]];
-  return !region.shadow && static_cast<double>(region.blocks) >= constants_.least_blocks;
+  return !region.shadow && is_large(region);
 }
 
 bool HardShadows::next_to_thing(int col, int row) const {
@@ -346,7 +376,7 @@ bool HardShadows::take_out(const Planes& planes, const RgbColours& rgb, const ui
                            uint8_t* mask, uint8_t* marks) {
   if (!read_blocks(planes, rgb, black, mask)) return false;
   find_regions();
-  if (regions_.empty()) return false;
+  if (!find_judged()) return false;
   for (const uint32_t block : white_) add_pairs(block);
   decide();
   bool any = false;

@@ -82,7 +82,7 @@ class HardShadows {
   struct Region {
     int64_t blocks, squares, both, light, level, pairs;
     std::array<int64_t, 3> ratio, clipped;
-    bool shadow;
+    bool judged, shadow;  // judged: large, and of a ratio that a shadow may have
   };
 
   size_t index(int col, int row) const {
@@ -90,12 +90,16 @@ class HardShadows {
   }
   bool read_blocks(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
                    const uint8_t* mask);
+  std::array<int, 3> quarters_of(const std::array<int, 3>& sum, int count, const RgbColours& rgb,
+                                 const uint8_t black[3]) const;
   void read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
                   const uint8_t* mask, int col, int row);
   void join(size_t a, size_t b);
   void find_regions();
   void add_pairs(size_t block);
+  bool is_large(const Region& region) const;
   bool is_lit(const Region& region) const;
+  bool find_judged();
   size_t ratio_of(const Region& region) const;
   void decide();
   bool clear_shadow(size_t block, uint8_t* mask, uint8_t* marks) const;
@@ -107,7 +111,8 @@ class HardShadows {
   HardShadowConstants constants_;
   int width_, height_, side_, cols_, rows_;
   std::vector<int16_t> logs_, steps_;  // of quarters of a level
-  int dark_, hardly_dark_;             // logs of ratios
+  int dark_, hardly_dark_, edge_;      // logs of ratios
+  int clipped_;                        // quarters of a level
   std::vector<uint8_t> flags_;         // by block
   std::vector<uint32_t> white_;        // blocks in the mask, in order: few of all
   std::vector<Block> blocks_;

@@ -53,6 +53,7 @@ struct Box {
 struct Pixels {
   std::vector<float> look[kChannels], background[kChannels];
   std::vector<uint8_t> place;
+  std::vector<uint32_t> inside;  // pixels in the region
 
   Pixels(const Grid& grid, const Box& box, const ContourPictures& from) {
     const size_t count = box.width * box.height;
@@ -106,7 +107,9 @@ struct Pixels {
                          static_cast<size_t>(x - box.first_col);
         float apart = 0;
         for (size_t c = 0; c < kChannels; ++c) apart += std::abs(look[c][p] - background[c][p]);
-        if (apart > kDiffer) place[p] = near ? in_region : beside;
+        if (apart <= kDiffer) continue;
+        place[p] = near ? in_region : beside;
+        if (near) inside.push_back(static_cast<uint32_t>(p));
       }
   }
 };
@@ -126,9 +129,8 @@ RegionContours contours_of(const Grid& grid, const std::vector<int>& region,
     return static_cast<double>(std::min(sum / kChannels, steps::contours::kMostEdge));
   };
   const auto compare = [&](size_t a, size_t b) {
-    const uint8_t one = pixels.place[a], other = pixels.place[b];
-    if (one == other || (one != in_region && other != in_region)) return;
-    if (one == beside || other == beside) {
+    if (pixels.place[b] == in_region) return;
+    if (pixels.place[b] == beside) {
       ++result.open;
       return;
     }
@@ -136,12 +138,13 @@ RegionContours contours_of(const Grid& grid, const std::vector<int>& region,
     of_background += edge(pixels.background, a, b);
     ++result.pairs;
   };
-  for (size_t y = 0; y < box.height; ++y)
-    for (size_t x = 0; x < box.width; ++x) {
-      const size_t p = y * box.width + x;
-      if (x + kApart < box.width) compare(p, p + kApart);
-      if (y + kApart < box.height) compare(p, p + kApart * box.width);
-    }
+  for (const uint32_t p : pixels.inside) {
+    const size_t x = p % box.width, y = p / box.width;
+    if (x + kApart < box.width) compare(p, p + kApart);
+    if (y + kApart < box.height) compare(p, p + kApart * box.width);
+    if (x >= kApart) compare(p, p - kApart);
+    if (y >= kApart) compare(p, p - kApart * box.width);
+  }
   if (result.pairs == 0) return result;
   result.look = static_cast<float>(of_look / static_cast<double>(result.pairs));
   result.background = static_cast<float>(of_background / static_cast<double>(result.pairs));
