@@ -3,6 +3,7 @@
 // things; a simulated street in the sun.
 #include "core/foreground/hard_shadows.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <queue>
@@ -52,6 +53,8 @@ class Reference {
         flood(k, regions++);
         sums.push_back(sums_of(regions - 1));
       }
+    if (std::none_of(sums.begin(), sums.end(), [&](const Sums& of) { return is_judged(of); }))
+      return mask;
     std::vector<bool> shadow(sums.size());
     for (size_t i = 0; i < sums.size(); ++i) shadow[i] = is_shadow(sums[i]);
     learn(sums);
@@ -191,7 +194,7 @@ class Reference {
             std::clamp(place(b - g), -5, 4)};
   }
 
-  bool is_shadow(const Sums& sums) const {
+  bool is_judged(const Sums& sums) const {
     if (sums.blocks < all_.least_blocks) return false;
     double squares = sums.squares / sums.blocks;
     for (const double ratio : sums.ratio) squares -= std::pow(ratio / sums.blocks, 2);
@@ -204,6 +207,11 @@ class Reference {
         if (bluer < -(red_bound && !blue_bound ? all_.redder_bound : all_.redder)) return false;
         if (bluer > (blue_bound && !red_bound ? all_.bluer_bound : all_.bluer)) return false;
       }
+    return true;
+  }
+
+  bool is_shadow(const Sums& sums) const {
+    if (!is_judged(sums)) return false;
     const auto place = ratio_of(sums);
     const double level = sums.level + all_.noise_of_pair * sums.pairs;
     double both_known = sums.both, level_known = level;
@@ -221,8 +229,7 @@ class Reference {
     for (auto& [place, known] : known_)
       for (double& sum : known) sum *= std::exp2(-1 / all_.half_life);
     for (const Sums& sums : regions) {
-      if (sums.blocks < all_.least_blocks ||
-          (sums.blocks < 4 * all_.least_blocks && sums.both > 0.3 * sums.level))
+      if (!is_judged(sums) || (sums.blocks < 4 * all_.least_blocks && sums.both > 0.3 * sums.level))
         continue;
       auto& known = known_[ratio_of(sums)];
       known[0] += sums.both;
