@@ -44,6 +44,8 @@ class Stage {
   explicit Stage(int64_t young_frames = 0) : memory(grid, young_frames) {
     for (std::vector<float>* planes : {&background, &shown})
       planes->assign(kChannels * grid.cells(), kFloor);
+    // Enough frames have shown the floor.
+    if (young_frames == 0) memory.grow_up();
   }
 
   // What is seen, or known, at a place from now on.

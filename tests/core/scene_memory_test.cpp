@@ -104,6 +104,29 @@ TEST(SceneMemory, MotionSaysTheContrary) {
   EXPECT_EQ(stage.frames_until_found(200), kSteady);
 }
 
+// Of a place whose background few frames have shown, nothing is known that could stay: the solve
+// counts what frames show.
+TEST(SceneMemory, PlacesAreYoungUntilEnoughFramesHaveShownThem) {
+  // The first frames make the look.
+  const int enough = static_cast<int>(steps::proofs::kYoungFrames) + kSteady - 1;
+  for (const int shown : {enough / 2, enough - 1, enough}) {
+    Stage stage;
+    stage.memory.forget();
+    for (int seen = 0; seen < shown; ++seen) {
+      stage.nothing_passes();
+      stage.frames(1);
+      if (seen % 20 != 19) continue;
+      // Lorries hide the floor half of the time.
+      stage.passes([](int row, int col) { return kPlace.wider(1).has(row, col); });
+      stage.frames(20);
+    }
+    stage.nothing_passes();
+    stage.show(kPlace, kBag);
+    stage.frames(100);
+    EXPECT_EQ(stage.proofs().any, shown == enough) << shown;
+  }
+}
+
 // It was hidden for a while: what counts is what passed around it before.
 TEST(SceneMemory, MotionIsThatBeforeThePlaceWasHidden) {
   for (bool moved : {false, true}) {

@@ -35,7 +35,9 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
       differs_(grid.cells()),
       unjudged_(grid.cells()),
       marks_(grid.cells()),
+      shown_(grid.cells()),
       young_frames_(young_frames) {
+  for (std::vector<float>& levels : background_) levels.resize(grid.cells());
   found_.reserve(grid.cells());
   around_.reserve(grid.cells());
   differing_.reserve(grid.cells());
@@ -43,7 +45,8 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
 
 uint64_t SceneMemory::bytes(const Grid& grid) {
   return StandingLooks::bytes(grid) + HistoryStarts::bytes(grid.cells()) +
-         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 3 * sizeof(int));
+         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 4 * sizeof(int) +
+                         kChannels * sizeof(float));
 }
 
 void SceneMemory::forget() {
@@ -53,8 +56,9 @@ void SceneMemory::forget() {
   std::fill(of_.begin(), of_.end(), Of::none);
   std::fill(differs_.begin(), differs_.end(), uint8_t{0});
   std::fill(left_.begin(), left_.end(), StandingLooks::kNever);
+  std::fill(shown_.begin(), shown_.end(), 0);
   newest_left_ = StandingLooks::kNever;
-  news_ = false;
+  news_ = grown_up_ = false;
 }
 
 void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
@@ -244,6 +248,7 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
     return left;
   }
   looks_.find_differing(background, &differs_, &differing_);
+  count_shown(background);
   const bool any_left =
       newest_left_ != StandingLooks::kNever && looks_.newest() - newest_left_ <= kPieces;
   if (differing_.size() < kLeastRegion && (differing_.empty() || !any_left)) return found_;
@@ -321,6 +326,27 @@ float SceneMemory::apart(int cell, const float* const background[3]) const {
   return sum;
 }
 
+// Another background begins with the frames of the look that it has.
+void SceneMemory::count_shown(const float* const background[3]) {
+  for (size_t cell = 0; cell < shown_.size(); ++cell) {
+    float moved = 0;
+    for (size_t c = 0; c < kChannels; ++c) {
+      moved += std::abs(background[c][cell] - background_[c][cell]);
+      background_[c][cell] = background[c][cell];
+    }
+    const int at = static_cast<int>(cell);
+    const bool shows = !differs_[cell] && looks_.shows_look(at);
+    if (grown_up_) {
+      shown_[cell] = static_cast<int>(kYoungFrames);
+    } else if (moved >= StandingLooks::kSame) {
+      shown_[cell] = shows ? looks_.frames(at) : 0;
+    } else {
+      shown_[cell] += shows;
+    }
+  }
+  grown_up_ = false;
+}
+
 // What left reaches into the cells around.
 void SceneMemory::widen(const float* const background[3]) {
   std::fill(marks_.begin(), marks_.end(), uint8_t{0});
@@ -359,6 +385,7 @@ void SceneMemory::hand_over(Proofs* solve) {
     const int at = static_cast<int>(cell);
     const Of of = since_[cell] >= looks_.since(at) ? of_[cell] : Of::none;
     marks_[cell] = of == Of::came || (of == Of::none && differs_[cell]);
+    marks_[cell] &= shown_[cell] >= kYoungFrames;
     if (!marks_[cell]) continue;
     solve->any = true;
     solve->came[cell] = 1;

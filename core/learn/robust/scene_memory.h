@@ -3,6 +3,7 @@
 // uncovered.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -60,8 +61,11 @@ class SceneMemory {
   // What is known of a cell, for a file and back: see StandingLooks.
   void write(size_t cell, int64_t now, LearntPlace* out) const;
   bool read(size_t cell, int64_t now, const LearntPlace& from);
-  // Somebody else has seen enough frames: the scene is not young.
-  void grow_up() { followed_ = std::max(followed_, young_frames_); }
+  // Somebody else has seen enough frames: neither the scene nor its places are young.
+  void grow_up() {
+    followed_ = std::max(followed_, young_frames_);
+    grown_up_ = true;
+  }
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
     looks_.follow(frame, gain, number);
@@ -82,7 +86,9 @@ class SceneMemory {
   // True while so few frames were seen that nothing is known: looks are judged by contours alone,
   // as windows judge them.
   bool young() const { return followed_ < young_frames_; }
-  // Makes `solve` what is known, with the background of the newest judge(). Takes no memory.
+  // Makes `solve` what is known, with the background of the newest judge(). Nothing is known of
+  // places whose background was seen in few frames: lorries may have hidden most of the street for
+  // the whole of a window. There the look counts that more frames show. Takes no memory.
   void hand_over(Proofs* solve);
 
   // Where something was found to have left, and since when.
@@ -116,6 +122,7 @@ class SceneMemory {
   bool is_most_of_picture() const;
   void judge_as_one();
   float apart(int cell, const float* const background[3]) const;
+  void count_shown(const float* const background[3]);
   template <typename What>
   void each_near(int cell, int reach, const What& what) const;
 
@@ -128,6 +135,10 @@ class SceneMemory {
   std::vector<int64_t> since_, left_;
   int64_t newest_left_ = StandingLooks::kNever;
   std::vector<uint8_t> differs_, unjudged_, marks_;
+  // By cells: the background, and how many frames have shown it.
+  std::array<std::vector<float>, kChannels> background_;
+  std::vector<int> shown_;
+  bool grown_up_ = false;
   std::vector<int> found_, around_, differing_;
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;

@@ -46,6 +46,8 @@ class StandingLooks {
   // The frame with which its look came. What was hidden for no longer than it had been there goes
   // on to be what it was.
   int64_t since(int cell) const { return cells_[static_cast<size_t>(cell)].look.since; }
+  // How many frames have shown it since it came last.
+  int frames(int cell) const { return frames_[static_cast<size_t>(cell)]; }
   // The newest frame that showed the look before; kNever: there was none.
   static constexpr int64_t kNever = INT64_MIN;
   int64_t before_until(int cell) const {
