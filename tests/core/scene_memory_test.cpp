@@ -105,25 +105,34 @@ TEST(SceneMemory, MotionSaysTheContrary) {
 }
 
 // Of a place whose background few frames have shown, nothing is known that could stay: the solve
-// counts what frames show.
+// counts what frames show. The first frames make the look.
 TEST(SceneMemory, PlacesAreYoungUntilEnoughFramesHaveShownThem) {
-  // The first frames make the look.
-  const int enough = static_cast<int>(steps::proofs::kYoungFrames) + kSteady - 1;
+  const int enough = static_cast<int>(steps::proofs::kLasts) + kSteady - 1;
   for (const int shown : {enough / 2, enough - 1, enough}) {
     Stage stage;
     stage.memory.forget();
-    for (int seen = 0; seen < shown; ++seen) {
-      stage.nothing_passes();
-      stage.frames(1);
-      if (seen % 20 != 19) continue;
-      // Lorries hide the floor half of the time.
-      stage.passes([](int row, int col) { return kPlace.wider(1).has(row, col); });
-      stage.frames(20);
-    }
-    stage.nothing_passes();
+    stage.frames(shown);
     stage.show(kPlace, kBag);
     stage.frames(100);
     EXPECT_EQ(stage.proofs().any, shown == enough) << shown;
+  }
+}
+
+// Where other looks were there for as long, more frames must have shown it: bags hide the floor for
+// half of the time.
+TEST(SceneMemory, PlacesThatShowManyLooksAreYoungForLonger) {
+  constexpr int kTurn = 40;  // frames
+  const auto known = static_cast<int>(steps::proofs::kYoungFrames);
+  for (const int turns : {known / kTurn - 1, 2 * known / kTurn}) {
+    Stage stage;
+    stage.memory.forget();
+    for (int turn = 0; turn < turns; ++turn) {
+      stage.show(kPlace, kFloor);
+      stage.frames(kTurn);
+      stage.show(kPlace, turn % 2 ? kBag : kBag + 120);
+      stage.frames(kTurn);
+    }
+    EXPECT_EQ(stage.proofs().any, turns * (kTurn - kSteady) >= known) << turns;
   }
 }
 

@@ -36,6 +36,7 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
       unjudged_(grid.cells()),
       marks_(grid.cells()),
       shown_(grid.cells()),
+      others_(grid.cells()),
       young_frames_(young_frames) {
   for (std::vector<float>& levels : background_) levels.resize(grid.cells());
   found_.reserve(grid.cells());
@@ -45,7 +46,7 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
 
 uint64_t SceneMemory::bytes(const Grid& grid) {
   return StandingLooks::bytes(grid) + HistoryStarts::bytes(grid.cells()) +
-         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 4 * sizeof(int) +
+         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 5 * sizeof(int) +
                          kChannels * sizeof(float));
 }
 
@@ -57,6 +58,7 @@ void SceneMemory::forget() {
   std::fill(differs_.begin(), differs_.end(), uint8_t{0});
   std::fill(left_.begin(), left_.end(), StandingLooks::kNever);
   std::fill(shown_.begin(), shown_.end(), 0);
+  std::fill(others_.begin(), others_.end(), 0);
   newest_left_ = StandingLooks::kNever;
   news_ = grown_up_ = false;
 }
@@ -340,11 +342,22 @@ void SceneMemory::count_shown(const float* const background[3]) {
       shown_[cell] = static_cast<int>(kYoungFrames);
     } else if (moved >= StandingLooks::kSame) {
       shown_[cell] = shows ? looks_.frames(at) : 0;
+      others_[cell] = 0;
     } else {
       shown_[cell] += shows;
+      others_[cell] += differs_[cell];
     }
   }
   grown_up_ = false;
+}
+
+// Lorries may have hidden most of a street for the whole of a window: nothing is known of a place
+// until many frames have shown its background, or three seconds of frames which are most of those
+// before the look that is there now. Until then the look counts that more frames show.
+bool SceneMemory::is_known(size_t cell) const {
+  const int64_t now = looks_.newest() - looks_.since(static_cast<int>(cell)) + 1;
+  return shown_[cell] >= kYoungFrames ||
+         (shown_[cell] >= kLasts && shown_[cell] >= 2 * (others_[cell] - now));
 }
 
 // What left reaches into the cells around.
@@ -385,8 +398,10 @@ void SceneMemory::hand_over(Proofs* solve) {
     const int at = static_cast<int>(cell);
     const Of of = since_[cell] >= looks_.since(at) ? of_[cell] : Of::none;
     marks_[cell] = of == Of::came || (of == Of::none && differs_[cell]);
-    marks_[cell] &= shown_[cell] >= kYoungFrames;
-    if (!marks_[cell]) continue;
+    if (!marks_[cell] || !is_known(cell)) {
+      marks_[cell] = 0;
+      continue;
+    }
     solve->any = true;
     solve->came[cell] = 1;
     solve->since[cell] = of == Of::came ? since_[cell] : Proofs::kUnsure;

@@ -86,9 +86,7 @@ class SceneMemory {
   // True while so few frames were seen that nothing is known: looks are judged by contours alone,
   // as windows judge them.
   bool young() const { return followed_ < young_frames_; }
-  // Makes `solve` what is known, with the background of the newest judge(). Nothing is known of
-  // places whose background was seen in few frames: lorries may have hidden most of the street for
-  // the whole of a window. There the look counts that more frames show. Takes no memory.
+  // Makes `solve` what is known, with the background of the newest judge(). Takes no memory.
   void hand_over(Proofs* solve);
 
   // Where something was found to have left, and since when.
@@ -123,6 +121,7 @@ class SceneMemory {
   void judge_as_one();
   float apart(int cell, const float* const background[3]) const;
   void count_shown(const float* const background[3]);
+  bool is_known(size_t cell) const;
   template <typename What>
   void each_near(int cell, int reach, const What& what) const;
 
@@ -135,9 +134,9 @@ class SceneMemory {
   std::vector<int64_t> since_, left_;
   int64_t newest_left_ = StandingLooks::kNever;
   std::vector<uint8_t> differs_, unjudged_, marks_;
-  // By cells: the background, and how many frames have shown it.
+  // By cells: the background, and how many frames have shown it, or another look.
   std::array<std::vector<float>, kChannels> background_;
-  std::vector<int> shown_;
+  std::vector<int> shown_, others_;
   bool grown_up_ = false;
   std::vector<int> found_, around_, differing_;
   bool news_ = false;

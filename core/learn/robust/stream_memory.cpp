@@ -63,17 +63,17 @@ void StreamMemory::take(const WindowSolve& solve, const GridFrames& cells, int a
   if (context_.parameters.earlier_share > 0)
     earlier_.take(context_.grid, solve.reference(), solve.spread(), cells, at, solve.stable(),
                   solve.start_frames(), fresh_, history.held());
-  keep_some(history.disturbances());
+  keep_some(solve, history.disturbances());
 }
 
 // For windows to come.
-void StreamMemory::keep_some(const Disturbances& disturbances) {
+void StreamMemory::keep_some(const WindowSolve& solve, const Disturbances& disturbances) {
   const int step =
       steps::memory::kStep * remembered_stride(context_.room.models, context_.room.window_size);
   for (int i = 0; i < window_->size(); ++i) {
     const int64_t number = first_number() + i;
     if (number < stream_from_ || (number - stream_from_) % step != 0) continue;
-    if (number <= frames_.newest() || disturbances.has(number)) continue;
+    if (number <= frames_.newest() || disturbances.has(number) || !solve.is_shown(number)) continue;
     frames_.keep(number, *window_, i, context_.room.frames->cells(),
                  int64_t{steps::memory::kWindows} * context_.room.window_size, context_.room.pool);
   }

@@ -39,7 +39,7 @@ class StreamMemory {
   FrameMemory* frames() { return &frames_; }
 
  private:
-  void keep_some(const Disturbances& disturbances);
+  void keep_some(const WindowSolve& solve, const Disturbances& disturbances);
 
   const RobustContext& context_;
   EarlierWindow earlier_, left_;  // of the scene, and of the one that was left

@@ -52,6 +52,9 @@ class WindowSolve {
   // Quarters of a level, mean of 5 x 5.
   const std::vector<uint8_t>& spread() const { return spread_; }
   const StableFrames& stable() const { return stable_; }
+  // False for a frame that says nothing of the background: something disturbed it, or frames next
+  // to it.
+  bool is_shown(int64_t number) const;
   // How many frames its start compared.
   int start_frames() const { return start_frames_; }
   // The gains of all frames of the window, over picture `at` of `background`.
@@ -79,6 +82,8 @@ class WindowSolve {
   Looks gather(const Known& known);
   void start(const Known& known);
   void choose_shown(const Known& known, int old);
+  bool leave_out_disturbed(const WindowLight& light, const GridFrames& median);
+  GridPictures cells_of_shown() const;
   void carry_gains();
   void take_unit_of(const GridFrames& earlier, GridFrames* here);
   void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;

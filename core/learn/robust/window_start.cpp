@@ -27,22 +27,24 @@ Limits limits_of_spreads(int spreads, int least) {
 WindowSolve::Looks WindowSolve::gather(const Known& known) {
   const SnapshotRange& snapshots = window_->snapshots;
   const size_t cells = context_.grid.cells();
-  const GridFrames& of_frames = context_.room.frames->cells();
   const FrameMemory& memory = *known.memory;
   const int m = snapshots.size();
   Looks looks;
   const int old = looks.old = memory.older_than(window_->first);
   choose_shown(known, old);
-  const int shown = static_cast<int>(shown_.size());
-  GridPictures frames(cells);
-  frames.reserve(shown);
-  for (int t : shown_) frames.add(of_frames.plane(snapshots.slot(t), 0));
   GridFrames& here = looks.median;
   WindowLight light = {{}, false};
-  if (shown > 0)
-    light = light_of(frames, shown, context_.room.pool, &here);
-  else
+  const auto find_light = [&] {
+    light = light_of(cells_of_shown(), static_cast<int>(shown_.size()), context_.room.pool, &here);
+  };
+  if (shown_.empty())
     here = known.earlier->cells();
+  else
+    find_light();
+  const bool nothing_known = !known.earlier->known() || known.history->young();
+  if (nothing_known && leave_out_disturbed(light, here)) find_light();
+  const int shown = static_cast<int>(shown_.size());
+  const GridPictures frames = cells_of_shown();
   gains_.assign(static_cast<size_t>(m), kSameLight);
   for (size_t i = 0; i < shown_.size(); ++i)
     gains_[static_cast<size_t>(shown_[i])] = context_.of_format(light.gains[i]);
@@ -102,6 +104,66 @@ void WindowSolve::choose_shown(const Known& known, int old) {
   if (!shown_.empty() || old > 0) return;
   shown_.resize(static_cast<size_t>(m));
   std::iota(shown_.begin(), shown_.end(), 0);
+}
+
+GridPictures WindowSolve::cells_of_shown() const {
+  const GridFrames& cells = context_.room.frames->cells();
+  GridPictures frames(context_.grid.cells());
+  frames.reserve(static_cast<int>(shown_.size()));
+  for (int t : shown_) frames.add(cells.plane(window_->snapshots.slot(t), 0));
+  return frames;
+}
+
+// In a first window nobody knows yet what is usual: most of its frames say that. Frames that differ
+// from the median in much more of the picture, from one frame to the next, say nothing of the
+// background (disturbances.h). They are fewer than half. median: of those in shown_, in unit light.
+// False where there are none.
+bool WindowSolve::leave_out_disturbed(const WindowLight& light, const GridFrames& median) {
+  const size_t cells = context_.grid.cells();
+  const GridPictures frames = cells_of_shown();
+  std::vector<double> shares(shown_.size());
+  for (size_t i = 0; i < shares.size(); ++i) {
+    const int frame = static_cast<int>(i);
+    const Gain& gain = light.gains[i];
+    size_t differing = 0;
+    for (size_t cell = 0; cell < cells; ++cell) {
+      const auto found = unclipped(
+          {frames.plane(frame, 0)[cell], frames.plane(frame, 1)[cell],
+           frames.plane(frame, 2)[cell]},
+          {median.plane(0, 0)[cell], median.plane(0, 1)[cell], median.plane(0, 2)[cell]}, gain);
+      float apart = 0;
+      for (size_t c = 0; c < kChannels; ++c)
+        apart += std::abs(found[c] / gain[c] - median.plane(0, static_cast<int>(c))[cell]);
+      differing += apart > kChannels * steps::contours::kLooksDiffer;
+    }
+    shares[i] = static_cast<double>(differing) / static_cast<double>(cells);
+  }
+  std::vector<double> sorted = shares;
+  const auto middle = sorted.begin() + static_cast<ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double most = *middle + steps::disturbance::kLeast;
+  // Objects come and go in steps.
+  std::vector<uint8_t> disturbed(shares.size());
+  for (size_t first = 0; first < shares.size();) {
+    size_t end = first;
+    while (end < shares.size() && shares[end] > most) ++end;
+    using steps::disturbance::kAtOnce;
+    const bool begins = first > 0 && shares[first] - shares[first - 1] > kAtOnce,
+               ends = end > first && end < shares.size() && shares[end - 1] - shares[end] > kAtOnce;
+    if (begins || ends) std::fill_n(disturbed.data() + first, end - first, uint8_t{1});
+    first = std::max(end, first + 1);
+  }
+  size_t i = 0;
+  return std::erase_if(shown_, [&](int) { return disturbed[i++] != 0; }) > 0;
+}
+
+bool WindowSolve::is_shown(int64_t number) const {
+  const int64_t t = (number - window_->first) / window_->stride;
+  const auto has = [&](int64_t at) {
+    return at >= window_->snapshots.size() ||
+           std::binary_search(shown_.begin(), shown_.end(), static_cast<int>(at));
+  };
+  return has(t) && (window_->number(static_cast<int>(t)) == number || has(t + 1));
 }
 
 // Frames that something disturbs have the light of those before them.
