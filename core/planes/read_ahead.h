@@ -25,6 +25,9 @@ class ReadAhead {
   ReadAhead(const SnapshotRange& snapshots, size_t threads)
       : ReadAhead(snapshots, all_of(snapshots), threads) {}
 
+  // Pixels that are asked for at once.
+  size_t part() const { return part_; }
+
   // Thread `worker` is about to read pixels first .. first + count - 1.
   void read(size_t worker, size_t first, size_t count) {
     if (!snapshots_.on_disk()) return;
