@@ -48,8 +48,9 @@ void declare(CLI::App& app, JobOptions& options, Words& words) {
                  "times --warm-up)")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
-  app.add_option("--warm-up", options.warm_up,
-                 "Frames before a stretch that the process looks at first (-1: five windows)")
+  app.add_option(
+         "--warm-up", options.warm_up,
+         "Frames before a stretch that the process looks at first (-1: five windows, or some more)")
       ->check(CLI::Range(int64_t{-1}, int64_t{1} << 40))
       ->capture_default_str();
   app.add_option("--by", words.by,

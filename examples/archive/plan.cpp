@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -18,6 +19,9 @@ using Json = nlohmann::ordered_json;
 // The scene's memory needs so many windows before pictures are what one process would have made of
 // them (docs/archive.md).
 constexpr int kWarmUpWindows = 5;
+// Masks learn from one row in so many of each frame, in turn (PixelNoise): if a stream begins at
+// another row, all masks differ a little, for good.
+constexpr int64_t kTurn = 8;
 // Where the stretch is chosen, it is at most so many times as long as what warms it up.
 constexpr int kMostStretch = 15;
 // A frame to warm up takes half of what others take: nothing is made of it.
@@ -133,6 +137,7 @@ Plan make_plan(const PlanOptions& options) {
   const int64_t warm_up = whole_windows(
       options.warm_up < 0 ? int64_t{kWarmUpWindows} * options.window : options.warm_up,
       options.window);
+  const int64_t turn = std::lcm<int64_t>(options.window, kTurn);
   const Sizes sizes = sizes_of(options, frames.count, warm_up);
   int64_t first = 0;
   do {
@@ -141,6 +146,8 @@ Plan make_plan(const PlanOptions& options) {
     stretch.first = first;
     stretch.frames = frames.count > 0 ? std::min(size, frames.count - first) : 0;
     stretch.warm_up = std::min(first, warm_up);
+    // So many frames as they are: those that somebody named.
+    if (options.warm_up < 0) stretch.warm_up += (first - stretch.warm_up) % turn;
     if (plan.by_time) {
       std::tie(stretch.place, stretch.warm_up_time) = frames.find(first - stretch.warm_up);
       stretch.first_time = frames.find(first).second;
