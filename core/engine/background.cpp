@@ -134,6 +134,8 @@ void Background::rehearse(const Wishes& wishes) {
   std::vector<uint8_t> room(room_for_planes(snapshots_->shape(), snapshots_->depth()));
   for (int t = 0; t < snapshots_->size(); t += kEvery) {
     model.set_time(t);
+    snapshots_->will_need(t);
+    snapshots_->will_need(t + kEvery);
     const PlaneRows x(snapshots_->picture(t), room.data());
     decide({{},
             &model,

@@ -11,7 +11,7 @@ using State = Background::State;
 
 // Frames that enter the Gram matrix together: few enough that little is left to do when a window is
 // full, enough that they fill a register tile and the window is not read from memory for each of
-// them.
+// them. From a disk the window is read once, for all of them.
 constexpr int kGroup = 16;
 
 }  // namespace
@@ -34,7 +34,8 @@ bool BatchSchedule::take_in(const ImageView& frame) {
   if (collected() == window_size_) {
     end_window(late_frames_ == 0);
   } else if (!waiting_ && collection_->state == State::learnt &&
-             collection_->not_added >= std::min(kGroup, window_size_)) {
+             collection_->not_added >= std::min(kGroup, window_size_) &&
+             !frames().window().on_disk()) {
     add_group();
   }
   if (queue_.pending >= window_size_ + late_frames_) {

@@ -91,16 +91,27 @@ OutputTask LeavingFrame::task_of(Output output) {
   return task;
 }
 
+// All of this frame is read, and then the next one.
+void LeavingFrame::ask_ahead() const {
+  const SnapshotRange frames(this->frames().window());
+  frames.will_need(schedule_->next_index());
+  frames.will_need(schedule_->next_index() + 1);
+}
+
 // Once a frame, where pixels share samples.
 void LeavingFrame::read() {
   if (done_.read) return;
+  ask_ahead();
   planes_.read_all(pool());
   done_.read = true;
 }
 
 // Once a frame.
 void LeavingFrame::decide(OutputTask* task) {
-  if (!done_.decide) stage_.background->decide(planes_, pool());
+  if (!done_.decide) {
+    ask_ahead();
+    stage_.background->decide(planes_, pool());
+  }
   // It has read all rows, too.
   done_.decide = done_.read = true;
   task->mask = stage_.background->decision().mask();

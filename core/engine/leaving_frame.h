@@ -59,6 +59,7 @@ class LeavingFrame {
   Pose camera() const;
   OutputTask task_of(Output output);
   void meet();
+  void ask_ahead() const;
   void read();
   void decide(OutputTask* task);
   void soften(OutputTask* task);

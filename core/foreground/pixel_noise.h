@@ -26,7 +26,8 @@ class PixelNoise {
   void forget();
   // The noise of a row of pixels.
   uint16_t* row(int y) { return mean_.data() + static_cast<size_t>(y) * width_; }
-  // One row in a few of a frame says enough, other rows of each frame.
+  // One row in a few of a frame says enough, other rows of each frame. Streams of one recording
+  // agree best if they begin so many frames apart (kTurn of qdmd-archive).
   bool learns_from(int y) const { return (y + frames_) % kRows == 0; }
   // Learns from pixels left .. left + count - 1 of such a row. squared: squared distances; limit:
   // the pixels' own limits in levels; near: 0 for background that is not next to foreground; now:

@@ -105,6 +105,7 @@ bool FrameStore::append(const ImageView& frame, Pool* pool) {
   varies_[static_cast<size_t>(slot)] = !constant;
   if (!constant && !keep_alpha(slot, frame)) return false;
   take_contents(slot, pool);
+  planes_.written(slot);
   return true;
 }
 
@@ -157,6 +158,7 @@ bool FrameStore::steady(int index, const Pose& pose, Resampler* resampler, Pool*
   }
   poses_[static_cast<size_t>(slot)] = pose;
   take_contents(slot, pool);
+  planes_.written(slot);
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include "core/dmd/qdmd.h"
 #include "core/model/build_spread.h"
 #include "core/passes/sampling.h"
+#include "core/planes/read_ahead.h"
 
 namespace qdmd {
 namespace {
@@ -137,16 +138,45 @@ SnapshotRange GramLearner::columns_of(const SnapshotRange& snapshots) const {
 void GramLearner::add(const SnapshotRange& span, int frames, Slice slice) {
   const Clock::Span span_of_time(*room_.clock, Clock::products);
   const SnapshotRange columns = columns_of(span);
+  if (columns.on_disk()) return add_in_parts(columns, frames, slice);
+  const Lines all = lines_of(columns, slice);
+  // The first slice begins a group, however thin it is.
+  if (slice.index == 0 || all.count > 0) add_lines(columns, frames, all);
+}
+
+// What slices are made of: rows of shared samples, or samples.
+GramLearner::Lines GramLearner::lines_of(const SnapshotRange& columns, Slice slice) const {
   if (shares_chroma()) {
     const auto rows = static_cast<size_t>(columns.shape().chroma_height());
-    const size_t first = slice.first(rows, 1), count = slice.size(rows, 1);
-    // The first slice begins a group, however thin it is.
-    if (slice.index == 0 || count > 0)
-      gram_.add_rows(columns, frames, static_cast<int>(first), static_cast<int>(count));
-    return;
+    return {slice.first(rows, 1), slice.size(rows, 1)};
   }
-  gram_.add_slice(columns, frames, slice.first(columns.plane_size(), kUnit),
-                  slice.size(columns.plane_size(), kUnit));
+  return {slice.first(columns.plane_size(), kUnit), slice.size(columns.plane_size(), kUnit)};
+}
+
+void GramLearner::add_lines(const SnapshotRange& columns, int frames, Lines lines) {
+  if (shares_chroma())
+    gram_.add_rows(columns, frames, static_cast<int>(lines.first), static_cast<int>(lines.count));
+  else
+    gram_.add_slice(columns, frames, lines.first, lines.count);
+}
+
+// All products of a few pixels, and then those of the next ones: each pixel comes from the disk
+// once, where one group of frames after another would read the window for each of them.
+void GramLearner::add_in_parts(const SnapshotRange& columns, int frames, Slice slice) {
+  const Lines all = lines_of(columns, slice);
+  const ChromaShape& shape = columns.shape();
+  const size_t of_line =
+      shares_chroma() ? static_cast<size_t>(shape.width) * static_cast<size_t>(shape.rows) : 1;
+  const size_t unit = shares_chroma() ? 1 : kUnit;
+  ReadAhead ahead(columns, 1);
+  const size_t part = std::max<size_t>(1, ahead.part() / of_line / unit) * unit;
+  for (size_t done = 0; done == 0 || done < all.count; done += part) {
+    const Lines lines = {all.first + done, std::min(part, all.count - done)};
+    const size_t first = lines.first * of_line;
+    if (first < columns.pixels())
+      ahead.read(0, first, std::min(lines.count * of_line, columns.pixels() - first));
+    add_lines(columns, frames, lines);
+  }
 }
 
 void GramLearner::decompose(const SnapshotRange& snapshots) {
@@ -192,9 +222,12 @@ void GramLearner::build(Slice slice, BackgroundModel* model) {
     return;
   }
   const auto parts = static_cast<int>(std::max<size_t>(1, length / kPixelsPerPart));
-  room_.pool->run(static_cast<size_t>(parts), [&](size_t part) {
+  ReadAhead ahead(*snapshots_, room_.pool->threads());
+  room_.pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
     const Slice piece = {static_cast<int>(part), parts};
-    model->build_slice(first + piece.first(length, kUnit), piece.size(length, kUnit));
+    const size_t begin = first + piece.first(length, kUnit), count = piece.size(length, kUnit);
+    ahead.read(worker, begin, count);
+    model->build_slice(begin, count);
   });
 }
 

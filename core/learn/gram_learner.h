@@ -35,6 +35,12 @@ class GramLearner : public Learner {
   bool shares_chroma() const;
   // What the decomposition sees of them.
   SnapshotRange columns_of(const SnapshotRange& snapshots) const;
+  struct Lines {
+    size_t first, count;
+  };
+  Lines lines_of(const SnapshotRange& columns, Slice slice) const;
+  void add_lines(const SnapshotRange& columns, int frames, Lines lines);
+  void add_in_parts(const SnapshotRange& columns, int frames, Slice slice);
   double pixels_seen() const;
 
   LearnOptions options_;

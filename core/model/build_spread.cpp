@@ -7,6 +7,7 @@
 #include "core/passes/bands.h"
 #include "core/passes/digits.h"
 #include "core/passes/read_samples.h"
+#include "core/planes/read_ahead.h"
 
 namespace qdmd {
 namespace {
@@ -38,12 +39,14 @@ void build_runs(const SnapshotRange& snapshots, size_t first, size_t count, Pool
   const auto planes =
       std::make_unique_for_overwrite<const Sample*[]>(planes_of_run * pool->threads());
   const auto parts = static_cast<int>(std::max<size_t>(1, count / kWorthAThread));
+  ReadAhead ahead(snapshots, pool->threads());
   pool->run(static_cast<size_t>(parts), [&](size_t part, size_t worker) {
     const Slice slice = {static_cast<int>(part), parts};
     const size_t begin = first + slice.first(count, kUnit), end = begin + slice.size(count, kUnit);
     const Sample** const of_run = planes.get() + worker * planes_of_run;
     for (size_t p = begin; p < end; p += kRun) {
       const size_t length = std::min(kRun, end - p);
+      ahead.read(worker, p, length);
       Sample* to = room.get() + worker * planes_of_run * kRun;
       for (int t = 0; t < snapshots.size(); ++t)
         for (int c = 0; c < kChannels; ++c, to += kRun)

@@ -40,8 +40,9 @@ PlaneSlots::PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int d
       file_(std::move(file)) {}
 
 void PlaneSlots::take_pages(int slot, Pool* pool) {
+  if (on_disk()) return file_.forget(offset(slot, 0), slot_size());
   const uint64_t end = offset(slot + 1, 0);
-  if (!pool || file_.data() || end <= taken_ || reserved_ < kLargePage) return;
+  if (!pool || end <= taken_ || reserved_ < kLargePage) return;
   // As many for each thread, of machines with few.
   const uint64_t together = std::min<uint64_t>(pool->threads(), 4);
   const uint64_t needed = (end - taken_ + kLargePage - 1) / kLargePage;
@@ -52,6 +53,31 @@ void PlaneSlots::take_pages(int slot, Pool* pool) {
       qdmd::take_pages(memory_.get() + first, std::min<uint64_t>(kLargePage, reserved_ - first));
   });
   taken_ = std::min(taken_ + pages * kLargePage, reserved_);
+}
+
+void PlaneSlots::written(int slot) const {
+  if (on_disk()) file_.written(offset(slot, 0), slot_size());
+}
+
+void PlaneSlots::will_need(int slot) const {
+  if (on_disk()) file_.will_need(offset(slot, 0), slot_size());
+}
+
+void PlaneSlots::will_need(int slot, size_t first, size_t count) const {
+  if (!on_disk()) return;
+  for (int c = 0; c < kChannels; ++c) {
+    size_t begin = first, end = first + count;
+    if (c > 0 && shape_.is_shared()) {
+      // Rows of them.
+      const auto width = static_cast<size_t>(shape_.width), rows = static_cast<size_t>(shape_.rows),
+                 samples = static_cast<size_t>(shape_.chroma_width());
+      begin = first / width / rows * samples;
+      end = std::min((end - 1) / width / rows * samples + samples, chroma_samples_);
+    }
+    for (int digit = 0; digit < sample_bytes(depth_); ++digit)
+      file_.will_need(offset(slot, c) + static_cast<size_t>(digit) * digit_size() + begin,
+                      end - begin);
+  }
 }
 
 void PlaneSlots::pad(int slot) {

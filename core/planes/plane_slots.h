@@ -41,7 +41,7 @@ class PlaneSlots {
     return bytes(capacity, shape.pixels(), shape.samples(), depth);
   }
   // Of memory: none where they lie in a file.
-  uint64_t bytes() const { return file_.data() ? 0 : reserved_; }
+  uint64_t bytes() const { return on_disk() ? 0 : reserved_; }
 
   int capacity() const { return capacity_; }
   int depth() const { return depth_; }
@@ -63,9 +63,16 @@ class PlaneSlots {
     const Samples planes[] = {samples(slot, 0), samples(slot, 1), samples(slot, 2)};
     return {planes, shape_, depth_};
   }
-  // Takes the memory of slots up to this one on all threads of the pool, and no more than four
-  // large pages beyond it. Null, or never called: pages are taken as they are written.
+  bool on_disk() const { return file_.data() != nullptr; }
+  // This slot is about to be written: takes the memory of slots up to it on all threads of the
+  // pool, and no more than four large pages beyond it. Null, or never called: pages are taken as
+  // they are written. In a file, what the slot held is forgotten.
   void take_pages(int slot, Pool* pool);
+  // Where planes lie in a file: those of a slot stay as they are for a while; they are read soon;
+  // `count` pixels of them, 1 at least, from `first` on are.
+  void written(int slot) const;
+  void will_need(int slot) const;
+  void will_need(int slot, size_t first, size_t count) const;
   // Zeros behind the samples of a slot's planes, whose first ones, as many as a plane has, the
   // caller fills.
   void pad(int slot);
@@ -77,9 +84,10 @@ class PlaneSlots {
  private:
   PlaneSlots(int capacity, size_t pixels, size_t chroma_samples, int depth, PageFile file);
   static uint64_t bytes(int capacity, size_t pixels, size_t chroma_samples, int depth);
-  uint8_t* data() const { return file_.data() ? file_.data() : memory_.get(); }
+  uint8_t* data() const { return on_disk() ? file_.data() : memory_.get(); }
   // The bytes of a slot's planes of the highest eight bits.
   size_t digit_size() const { return plane_size_ + 2 * chroma_size_; }
+  uint64_t slot_size() const { return offset(1, 0); }
   size_t offset(int slot, int channel) const {
     const size_t before = channel == 0 ? 0 : plane_size_ + (channel == 2 ? chroma_size_ : 0);
     return static_cast<size_t>(slot * sample_bytes(depth_)) * digit_size() + before;

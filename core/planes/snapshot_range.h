@@ -35,6 +35,16 @@ class SnapshotRange {
     return sample_at(samples(index, channel), pixel, depth());
   }
 
+  bool on_disk() const { return planes_->on_disk(); }
+  // Where they are: snapshot `index`, which may be one behind the last, is read soon; `count`
+  // pixels of it, 1 at least, from `first` on are.
+  void will_need(int index) const {
+    if (index < size_) planes_->will_need(slot(index));
+  }
+  void will_need(int index, size_t first, size_t count) const {
+    planes_->will_need(slot(index), first, count);
+  }
+
   // The last `count` snapshots of it.
   SnapshotRange newest(int count) const {
     SnapshotRange range = *this;

@@ -44,12 +44,13 @@ void declare(CLI::App& app, JobOptions& options, Words& words) {
                  "way, the rest; the last one that ends joins them");
   app.add_flag("--join", options.join, "Do nothing but join what all parts have done");
   app.add_option("--stretch", options.stretch,
-                 "Frames that a process takes at a time (0: the recording's share, at most 25 "
+                 "Frames that a process takes at a time (0: the recording's share, at most 15 "
                  "times --warm-up)")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
-  app.add_option("--warm-up", options.warm_up,
-                 "Frames before a stretch that the process looks at first (-1: three windows)")
+  app.add_option(
+         "--warm-up", options.warm_up,
+         "Frames before a stretch that the process looks at first (-1: five windows, or some more)")
       ->check(CLI::Range(int64_t{-1}, int64_t{1} << 40))
       ->capture_default_str();
   app.add_option("--by", words.by,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -17,9 +18,14 @@ using Json = nlohmann::ordered_json;
 
 // The scene's memory needs so many windows before pictures are what one process would have made of
 // them (docs/archive.md).
-constexpr int kWarmUpWindows = 3;
-// What is spent on warming up is at most one part in so many where the stretch is chosen.
-constexpr int kMostStretch = 25;
+constexpr int kWarmUpWindows = 5;
+// Masks learn from one row in so many of each frame, in turn (PixelNoise): if a stream begins at
+// another row, all masks differ a little, for good.
+constexpr int64_t kTurn = 8;
+// Where the stretch is chosen, it is at most so many times as long as what warms it up.
+constexpr int kMostStretch = 15;
+// A frame to warm up takes half of what others take: nothing is made of it.
+constexpr int64_t kOfWarmUp = 2;
 // Frames whose times are compared with what is decoded.
 constexpr size_t kChecked = 64;
 
@@ -93,6 +99,24 @@ int64_t whole_windows(int64_t frames, int64_t window) {
   return std::max<int64_t>((frames + window - 1) / window, 0) * window;
 }
 
+// Of stretches, in frames.
+struct Sizes {
+  int64_t first, others;
+};
+
+// Where each process has one stretch, they end at about the same time: the first one needs no
+// warming up, and is longer.
+Sizes sizes_of(const PlanOptions& options, int64_t count, int64_t warm_up) {
+  const auto whole = [&](int64_t size) {
+    return std::max<int64_t>(whole_windows(size, options.window), options.window);
+  };
+  if (options.stretch > 0) return {whole(options.stretch), whole(options.stretch)};
+  const int64_t most = whole(kMostStretch * std::max<int64_t>(warm_up, 4 * options.window));
+  if (options.processes == 1 || count > options.processes * most) return {most, most};
+  const int64_t others = whole((count - warm_up / kOfWarmUp) / options.processes);
+  return {whole(count - (options.processes - 1) * others), others};
+}
+
 }  // namespace
 
 Plan make_plan(const PlanOptions& options) {
@@ -113,17 +137,17 @@ Plan make_plan(const PlanOptions& options) {
   const int64_t warm_up = whole_windows(
       options.warm_up < 0 ? int64_t{kWarmUpWindows} * options.window : options.warm_up,
       options.window);
-  int64_t size = options.stretch;
-  if (size == 0)
-    size = std::min((frames.count + options.processes - 1) / options.processes,
-                    kMostStretch * std::max<int64_t>(warm_up, 2 * options.window));
-  size = std::max<int64_t>(whole_windows(size, options.window), options.window);
+  const int64_t turn = std::lcm<int64_t>(options.window, kTurn);
+  const Sizes sizes = sizes_of(options, frames.count, warm_up);
   int64_t first = 0;
   do {
+    const int64_t size = first == 0 ? sizes.first : sizes.others;
     Stretch stretch;
     stretch.first = first;
     stretch.frames = frames.count > 0 ? std::min(size, frames.count - first) : 0;
     stretch.warm_up = std::min(first, warm_up);
+    // So many frames as they are: those that somebody named.
+    if (options.warm_up < 0) stretch.warm_up += (first - stretch.warm_up) % turn;
     if (plan.by_time) {
       std::tie(stretch.place, stretch.warm_up_time) = frames.find(first - stretch.warm_up);
       stretch.first_time = frames.find(first).second;

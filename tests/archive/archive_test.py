@@ -195,6 +195,15 @@ def any_number_of_processes(folder):
                 assert alone[kind] == whole[kind], f'{kind} in stretches, and in one'
 
 
+def the_first_stretch_is_longer(folder):
+    """It needs no warming up: all end at about the same time."""
+    run(folder, 'clip.mkv', *outputs('two'), '--window', 5, '--warm-up', 40, '--jobs', 2, '--quiet',
+        '--report', 'report.json')
+    stretches = json.loads((folder / 'report.json').read_text())['stretches']
+    assert [s['frames'] for s in stretches] == [55, 35], stretches
+    assert len(video(folder / 'two-mask.mkv')) == FRAMES
+
+
 def irregular(folder, name):
     """A file whose frames are shown at any times, and depend on many around."""
     buffers, caps = decoded(folder / 'clip.mkv')
@@ -641,7 +650,7 @@ def errors(folder):
 def main():
     cases = [(check.__name__.replace('_', ' '), check)
              for check in (one_stretch_is_the_element, any_number_of_processes,
-                           frames_are_found_again, rows_of_windows, colours_of_recordings,
+                           the_first_stretch_is_longer, frames_are_found_again, rows_of_windows, colours_of_recordings,
                            files_of_other_colours, what_colours_mean, files_and_pictures,
                            killed_and_resumed, a_process_that_dies, several_commands_share_a_job,
                            killed_while_parts_are_removed, resumed_with_other_options,

@@ -3,11 +3,16 @@
 #include "core/base/page_file.h"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <span>
+#include <thread>
 
 #include "tests/core/engine_util.h"
 #include "tests/core/robust_util.h"
@@ -31,19 +36,63 @@ class Folder {
   std::filesystem::path path_;
 };
 
-// How many bytes of files without a name this process has mapped.
-uint64_t mapped_bytes(const std::string& folder) {
+// The files without a name that this process has mapped.
+std::vector<std::span<uint8_t>> mappings(const std::string& folder) {
   std::ifstream maps("/proc/self/maps");
-  uint64_t sum = 0;
+  std::vector<std::span<uint8_t>> found;
   for (std::string line; std::getline(maps, line);) {
     if (line.find(folder) == std::string::npos) continue;
     EXPECT_NE(line.find("(deleted)"), std::string::npos) << line;
     uint64_t first = 0, end = 0;
     char dash = 0;
     std::istringstream(line) >> std::hex >> first >> dash >> end;
-    sum += end - first;
+    found.emplace_back(reinterpret_cast<uint8_t*>(first), end - first);
   }
+  return found;
+}
+
+uint64_t mapped_bytes(const std::string& folder) {
+  uint64_t sum = 0;
+  for (const auto pages : mappings(folder)) sum += pages.size();
   return sum;
+}
+
+// What a machine does that has no room for them. False: it did not.
+bool leave_memory(std::span<uint8_t> pages) {
+  EXPECT_EQ(msync(pages.data(), pages.size(), MS_SYNC), 0);
+  std::vector<uint8_t> in_memory((pages.size() + 4095) / 4096);
+  // A few of them may be in use by the system.
+  for (int turn = 0; turn < 100; ++turn) {
+    if (madvise(pages.data(), pages.size(), MADV_PAGEOUT) != 0) return false;
+    EXPECT_EQ(mincore(pages.data(), pages.size(), in_memory.data()), 0);
+    const auto left = std::count_if(in_memory.begin(), in_memory.end(),
+                                    [](uint8_t page) { return (page & 1) != 0; });
+    if (10 * left < std::ssize(in_memory)) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+bool leave_memory(const std::string& folder) {
+  const auto all = mappings(folder);
+  return std::all_of(all.begin(), all.end(),
+                     [](std::span<uint8_t> pages) { return leave_memory(pages); });
+}
+
+// Pages that this process had to wait for.
+long faults() {
+  rusage usage{};
+  EXPECT_EQ(getrusage(RUSAGE_SELF, &usage), 0);
+  return usage.ru_majflt;
+}
+
+// What this process has read from disks.
+uint64_t bytes_read() {
+  std::ifstream io("/proc/self/io");
+  for (std::string name, line; io >> name; std::getline(io, line)) {
+    uint64_t bytes = 0;
+    if (name == "read_bytes:" && io >> bytes) return bytes;
+  }
+  return 0;
 }
 
 TEST(PageFile, IsZerosWithoutAName) {
@@ -112,6 +161,51 @@ TEST(WindowOnDisk, GivesTheSamePictures) {
     }
   EXPECT_EQ(mapped_bytes(folder.path()), 0u);
   EXPECT_TRUE(folder.is_empty());
+}
+
+// As if no frame stayed in memory after one came, and after one left. Each frame is asked for
+// twice before it leaves, and solves read a part of their window. Slots of a window before are
+// written anew, and not read.
+TEST(WindowOnDisk, IsReadAFewTimesWhereItHasLeftMemory) {
+  const Folder folder;
+  constexpr int kWidth = 320, kHeight = 240, kWindow = 12;
+  std::mt19937 rng(69);
+  const Clip clip = moving_box_clip(kWidth * kHeight, 3 * kWindow, 400, rng);
+  EngineOptions options = robust_of(kWindow);
+  const auto in_memory = run_engine(clip, kWidth, kHeight, options, Output::mask);
+  options.window_on_disk = folder.path();
+  Engine engine;
+  ASSERT_TRUE(engine.configure(options, kWidth, kHeight).ok());
+  const long faults_before = faults();
+  const uint64_t before = bytes_read(),
+                 frame = mapped_bytes(folder.path()) /
+                         static_cast<uint64_t>(layout_of(options, kWidth, kHeight).capacity);
+  std::vector<std::vector<uint8_t>> on_disk;
+  const auto take = [&] {
+    while (engine.next()) {
+      if (!leave_memory(folder.path())) return false;
+      PackedPicture picture(kWidth, kHeight);
+      engine.next()->pop(Output::mask, picture.out());
+      on_disk.push_back(picture.planes());
+    }
+    return true;
+  };
+  const char* const kStay = "files of this folder do not leave memory";
+  for (const auto& pixels : clip.frames) {
+    PackedPicture picture(kWidth, kHeight);
+    picture.fill(pixels);
+    if (!leave_memory(folder.path())) GTEST_SKIP() << kStay;
+    ASSERT_TRUE(engine.push(picture.in()).ok());
+    if (!take()) GTEST_SKIP() << kStay;
+  }
+  ASSERT_TRUE(engine.drain().ok());
+  if (!take()) GTEST_SKIP() << kStay;
+  EXPECT_EQ(on_disk, in_memory);
+  const uint64_t read = bytes_read() - before;
+  if (read == 0) GTEST_SKIP() << folder.path() << " is on no disk";
+  EXPECT_LT(2 * read, 5 * clip.size() * frame);
+  // Pages are fetched together.
+  EXPECT_LT(faults() - faults_before, static_cast<long>(read / 4096 / 10));
 }
 
 TEST(WindowOnDisk, DoesNotCountAgainstMaxMemory) {

@@ -3,6 +3,7 @@
 // is what leaves where each pixel's own samples are kept.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <random>
 #include <string>
 #include <vector>
@@ -210,6 +211,25 @@ TEST(SharedEngine, MoreThanEightBitsInEverythingElse) {
     options.depth = 10;
     options.sample_step = 2;
     expect_the_same(options, p010, {67, 43});
+  }
+}
+
+// Passes ask for pixels in parts, of which these windows have several.
+TEST(SharedEngine, OnDiskIsTheSame) {
+  constexpr int kWindow = 40;
+  const Scene scene = {640, 480};
+  for (const auto& [layout, method] : {std::pair{kVideoLayouts[0], Method::robust},
+                                       {kVideoLayouts[0], Method::qdmd},
+                                       {kVideoLayouts[9], Method::qdmd}}) {
+    EngineOptions options = options_of(method, Mode::batch);
+    options.window_size = kWindow;
+    options.chroma_columns = layout.at[1].columns;
+    options.chroma_rows = layout.at[1].rows;
+    int moved = 0;
+    const auto in_memory = run(options, layout, scene, kWindow + 1, &moved);
+    options.window_on_disk = std::filesystem::temp_directory_path().string();
+    EXPECT_TRUE(run(options, layout, scene, kWindow + 1, &moved) == in_memory)
+        << layout.name << ", method " << static_cast<int>(method);
   }
 }
 

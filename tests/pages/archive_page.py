@@ -28,11 +28,16 @@ WIDTH, HEIGHT, FILM = 1920, 1080, 600
 # The film so many times: four minutes of 25 frames a second.
 TIMES = int(os.environ.get('QDMD_ARCHIVE_TIMES', 10))
 TURNS = int(os.environ.get('QDMD_ARCHIVE_TURNS', 5))
-WINDOW, WARM_UP = 100, 300
+WINDOW = 100
+# As qdmd-archive chooses them, of long recordings.
+WARM_UP = 500
+STRETCH = 15 * WARM_UP
 PARTS = (2, 3, 4, 8)
 # name: recording below QDMD_DATA, frames a second.
 SEQUENCES = {'vtest': ('videos/vtest.avi', 10), 'HighwayII': ('SBI/HighwayII/input', 25),
              'office': ('CDnet/office/input', 25)}
+# Simulated, with things that stop, stand and leave; longer than what is recorded.
+SCENE, SCENE_FRAMES = 'intermittent-motion', 3200
 MACHINES = (1, 2, 4, 8, 16, 32, 64)
 HOURS = 24
 
@@ -113,18 +118,28 @@ def agreement(one, other, frames):
     return 2 * both / max(2 * both + differ, 1)
 
 
-def agreement_table(folder):
-    rows = []
+def sequences(folder):
+    """Name, file and frames a second."""
     for name, (recording, rate) in SEQUENCES.items():
         path = pathlib.Path(os.environ.get('QDMD_DATA', ''), recording)
-        if not path.exists():
-            continue
+        if path.exists():
+            yield name, path, rate
+    path = pathlib.Path(folder, SCENE + '.mkv')
+    launch(f'qdmdscenesrc scene={SCENE} seed=3 num-buffers={SCENE_FRAMES} ! '
+           'video/x-raw,width=320,height=240 ! videoconvert ! video/x-raw,format=I420 ! avenc_ffv1 ! '
+           f'matroskamux ! filesink location={path}', '0,1')
+    yield SCENE, path, 25
+
+
+def agreement_table(folder):
+    rows = []
+    for name, path, rate in sequences(folder):
         words = ['--mask', f'{folder}/a.mkv', '--window', WINDOW, '--framerate', rate]
         run(folder, [path], *words, '--stretch', 10**9)
         whole = masks_of(f'{folder}/a.mkv')
         sizes = {-(-len(whole) // parts // WINDOW) * WINDOW for parts in PARTS}
         for size in sorted(sizes - {-(-len(whole) // WINDOW) * WINDOW}, reverse=True):
-            run(folder, [path], *words, '--stretch', size, '--warm-up', WARM_UP)
+            run(folder, [path], *words, '--stretch', size)
             masks = masks_of(f'{folder}/a.mkv')
             first = {t for t in range(size, len(whole)) if t % size < rate}
             rest = set(range(len(whole))) - first
@@ -143,11 +158,10 @@ def model_table(pairs, decode):
     warm = median((s['processor-seconds'] - work * s['frames']) / s['warm-up'] for s in second)
     joining = median(a['seconds-joining'] for a, _ in pairs) / one['frames']
     frames = HOURS * 3600 * 25
-    stretch = 25 * WARM_UP
     rows = []
     for machines in MACHINES:
-        turns = -(-frames // stretch // machines)
-        worked = turns * (stretch * work + WARM_UP * warm) if machines > 1 else frames * work
+        turns = -(-frames // STRETCH // machines)
+        worked = turns * (STRETCH * work + WARM_UP * warm) if machines > 1 else frames * work
         joined = joining * frames
         rows.append([str(machines), f'{worked / 3600:.2f}', f'{joined / 3600:.2f}',
                      f'{(worked + joined) / 3600:.2f}',

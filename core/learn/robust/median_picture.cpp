@@ -10,7 +10,7 @@ namespace qdmd {
 
 void median_picture(const Grid& grid, const StableFrames& stable,
                     const std::vector<LitPicture>& frames, Pool* pool, uint8_t* const background[3],
-                    uint8_t* spread, const SampleRange& range) {
+                    uint8_t* spread, const SampleRange& range, ReadAhead* ahead) {
   std::vector<MedianFrame> prepared(frames.size());
   for (size_t i = 0; i < frames.size(); ++i) {
     MedianFrame& at = prepared[i];
@@ -21,9 +21,12 @@ void median_picture(const Grid& grid, const StableFrames& stable,
     at.take_out({frames[i].gain, range});
   }
   // A row of cells a part.
-  pool->run(static_cast<size_t>(grid.rows), [&](size_t part) {
+  pool->run(static_cast<size_t>(grid.rows), [&](size_t part, size_t worker) {
     const int row = static_cast<int>(part);
     const int top = grid.top(row), bottom = grid.top(row + 1);
+    if (ahead)
+      ahead->read(worker, static_cast<size_t>(top) * static_cast<size_t>(grid.width),
+                  static_cast<size_t>(bottom - top) * static_cast<size_t>(grid.width));
     for (int col = 0; col < grid.cols; ++col) {
       const auto shown =
           stable.of_cell[part * static_cast<size_t>(grid.cols) + static_cast<size_t>(col)];

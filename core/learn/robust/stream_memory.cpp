@@ -74,6 +74,8 @@ void StreamMemory::keep_some(const WindowSolve& solve, const Disturbances& distu
     const int64_t number = first_number() + i;
     if (number < stream_from_ || (number - stream_from_) % step != 0) continue;
     if (number <= frames_.newest() || disturbances.has(number) || !solve.is_shown(number)) continue;
+    window_->will_need(i);
+    window_->will_need(i + step);
     frames_.keep(number, *window_, i, context_.room.frames->cells(),
                  int64_t{steps::memory::kWindows} * context_.room.window_size, context_.room.pool);
   }

@@ -8,6 +8,7 @@
 
 #include "core/dmd/qdmd.h"
 #include "core/learn/robust/thinning.h"
+#include "core/planes/read_ahead.h"
 
 namespace qdmd {
 namespace {
@@ -126,6 +127,8 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
   const auto scratch =
       std::make_unique_for_overwrite<uint8_t[]>(scratch_size * context_.room.pool->threads());
   mask_.find_all(snapshots.size(), context_.room.pool, [&](int t, size_t worker, uint8_t* bits) {
+    snapshots.will_need(t);
+    snapshots.will_need(t + 1);
     if (!std::binary_search(shown_.begin(), shown_.end(), t)) {
       std::fill_n(bits, mask_bytes(context_.pixels()), uint8_t{255});
       return;
@@ -177,6 +180,8 @@ Decomposition WindowSolve::decompose_filled() {
         std::make_unique_for_overwrite<uint8_t[]>(size * context_.room.pool->threads());
     context_.room.pool->run(static_cast<size_t>(snapshots.size()), [&](size_t part, size_t worker) {
       const int t = static_cast<int>(part), slot = samples_.slot(t);
+      ask_for_samples(snapshots, t);
+      ask_for_samples(snapshots, t + 1);
       uint8_t* const own_bits = bits.get() + worker * size;
       mask_.read(t, own_bits);
       uint8_t* const out[3] = {samples_.plane(slot, 0), samples_.plane(slot, 1),
@@ -200,8 +205,10 @@ void WindowSolve::combine(BackgroundModel* model) {
   for (size_t i = 0; i < context_.room.pool->threads(); ++i)
     fillers.emplace_back(snapshots.size(), context_.range());
   const size_t run = fillers[0].run();
+  ReadAhead ahead(snapshots, fillers.size());
   context_.room.pool->run((context_.pixels() + run - 1) / run, [&](size_t part, size_t worker) {
     const size_t first = part * run, count = std::min(run, context_.pixels() - first);
+    ahead.read(worker, first, count);
     model->build_from(
         fillers[worker].fill(snapshots, gains_, mask_, reference_, reach_.data(), first, count),
         first, count);
@@ -227,6 +234,15 @@ void WindowSolve::refine_light() {
   if (!clips_) settle_light(&gains_);
 }
 
+// Those of the sampled rows are read soon.
+void WindowSolve::ask_for_samples(const SnapshotRange& snapshots, int index) const {
+  if (!snapshots.on_disk() || index >= snapshots.size()) return;
+  const SampledRows rows = context_.sampled_rows();
+  const auto width = static_cast<size_t>(context_.grid.width);
+  for (int row = rows.first; row < rows.end; row += rows.step)
+    snapshots.will_need(index, static_cast<size_t>(row) * width, width);
+}
+
 // refine_gain() of some frames.
 void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
                                std::vector<Gain>* gains) {
@@ -235,6 +251,8 @@ void WindowSolve::refine_gains(const SnapshotRange& snapshots, const std::vector
   const auto gain_of = [&](size_t i) -> Gain& { return (*gains)[static_cast<size_t>(frames[i])]; };
   for (int round = 0; round < kGainRounds; ++round) {
     context_.room.pool->run(frames.size(), [&](size_t i) {
+      for (size_t next = i; next < std::min(i + 2, frames.size()); ++next)
+        ask_for_samples(snapshots, frames[next]);
       sums[i] = goes_on[i] ? gain_sums(reference_, snapshots.picture(frames[i]),
                                        {gain_of(i), context_.range()}, context_.sampled_rows(),
                                        context_.end_of_range(0))

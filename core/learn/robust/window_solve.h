@@ -76,6 +76,7 @@ class WindowSolve {
     std::vector<LitPicture> pictures;
     std::vector<const float*> cells;
     std::vector<int64_t> numbers;  // of the frames
+    std::vector<int> snapshots;    // of the window
     Recollection recollection;
     GridFrames median;  // of the window's frames, in unit light; where anybody asks for it
   };
@@ -96,6 +97,7 @@ class WindowSolve {
     return {gains_[static_cast<size_t>(snapshot)], context_.range()};
   }
   void refine_light();
+  void ask_for_samples(const SnapshotRange& snapshots, int index) const;
   void refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
                     std::vector<Gain>* gains);
   void find_foreground(const SolveHistory& history);

@@ -80,6 +80,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
         snapshots.shape()};
     looks.cells.push_back(frames.plane(at, 0));
     looks.numbers.push_back(window_->number(t));
+    looks.snapshots.push_back(t);
   }
   if (!known.earlier->known()) return looks;
   LightScratch scratch(cells);
@@ -319,8 +320,9 @@ void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earli
   uint8_t* background[kChannels];
   for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
   std::vector<uint8_t> spread(context_.pixels());
+  ReadAhead ahead(window_->snapshots, looks.snapshots, context_.room.pool->threads());
   median_picture(context_.grid, stable_, looks.pictures, context_.room.pool, background,
-                 spread.data(), context_.range());
+                 spread.data(), context_.range(), &ahead);
   recall_spread(earlier, &spread);
   blur(spread.data(), reference_.width, reference_.height, context_.room.pool, spread_.data());
   const RobustParameters& parameters = context_.parameters;
