@@ -143,6 +143,7 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
       colours_(colours),
       grey_(colours == Colours::grey),
       texture_(width, height, steps.constants),
+      flat_(width, height, shape_.step, colours, steps.constants),
       noise_(width, height, steps.constants),
       hard_(width, height, shape_.step, steps.constants.hard),
       specks_(width, height),
@@ -159,12 +160,14 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
 uint64_t Decision::bytes(int width, int height) {
   const Shape shape(width, height, true);
   return 5 * uint64_t{shape.padded()} + 2 * uint64_t{shape.pixels()} +
-         MovingTexture::bytes(width, height) + PixelNoise::bytes(width, height) +
-         HardShadows::bytes(width, height, shape.step) + Specks::bytes(width, height);
+         MovingTexture::bytes(width, height) + FlatThings::bytes(width, height, shape.step) +
+         PixelNoise::bytes(width, height) + HardShadows::bytes(width, height, shape.step) +
+         Specks::bytes(width, height);
 }
 
 void Decision::forget() {
   texture_.forget();
+  flat_.forget();
   noise_.forget();
   hard_.forget();
   frames_ = 0;
@@ -173,10 +176,11 @@ void Decision::forget() {
 
 void Decision::change_scene(bool returns) {
   if (!left_) {
-    left_ = Statistics{texture_, noise_, hard_.known(), frames_};
+    left_ = Statistics{texture_, flat_, noise_, hard_.known(), frames_};
     returns = false;
   } else {
     std::swap(left_->texture, texture_);
+    std::swap(left_->flat, flat_);
     std::swap(left_->noise, noise_);
     std::swap(left_->hard, hard_.known());
     std::swap(left_->frames, frames_);
@@ -225,6 +229,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
       texture_.end_frame(x);
     }
   }
+  if (now_.textures && steps_.flat) keep_flat_things();
   const bool learns = steps_.noise && !frame.fixed;
   in_rows([&](int first, int size) {
     vote({of_.foreground.data() + shape_.offset(0), shape_.stride, shape_.width, shape_.height,
@@ -512,6 +517,26 @@ bool Decision::much_moves() const {
   size_t moving = 0;
   for (size_t cell = 0; cell < cells; ++cell) moving += moves(cell);
   return static_cast<double>(moving) > constants().hard.most_moving * static_cast<double>(cells);
+}
+
+void Decision::keep_flat_things() {
+  FlatThings::Planes planes;
+  for (int c = 0; c < kChannels; ++c) {
+    planes.x[c] = now_.frame.x[c].high;
+    planes.l[c] = level_row(c, 0);
+  }
+  planes.differing = differing_row(0);
+  planes.x_stride = static_cast<size_t>(shape_.width);
+  planes.l_stride = shape_.stride;
+  flat_.keep(planes, foreground_row(0));
+  if (!steps_.light || !knows_light()) return;
+  flat_.visit_areas([&](const Rectangle& area) {
+    for (int y = area.y; y < area.y + area.height; ++y) {
+      Run run(y, area.x, area.width);
+      look_at(&run);
+      leave_shadows(run);
+    }
+  });
 }
 
 void Decision::leave_hard_shadows() {

@@ -14,6 +14,7 @@
 #include "core/base/large_vector.h"
 #include "core/base/levels.h"
 #include "core/foreground/decision_steps.h"
+#include "core/foreground/flat_things.h"
 #include "core/foreground/hard_shadows.h"
 #include "core/foreground/moving_texture.h"
 #include "core/foreground/pixel_noise.h"
@@ -51,8 +52,8 @@ struct Comparison {
 //   - it is L in another light (find_shaded; see Shadows; not in grey pictures: there the frame
 //     before had no colour),
 //   - it is hardly further from L than it is all the time (PixelNoise),
-//   - it is in a texture that moves (MovingTexture), and as near as ever to the background next to
-//     it,
+//   - it is in a texture that moves (MovingTexture), as near as ever to the background next to it,
+//     and in no flat thing (FlatThings),
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
 //     foreground, too,
 //   - it belongs to a part that is too small; holes that are too small are foreground (Specks),
@@ -157,6 +158,7 @@ class Decision {
   void look_around(Run* run);
   bool knows_light() const;
   bool much_moves() const;
+  void keep_flat_things();
   void leave_shadows(const Run& run);
   void leave_hard_shadows();
   void learn(int first_row, int row_count);
@@ -171,10 +173,12 @@ class Decision {
   Colours colours_;
   bool grey_ = false;  // the newest frame is
   MovingTexture texture_;
+  FlatThings flat_;
   PixelNoise noise_;
   HardShadows hard_;
   struct Statistics {
     MovingTexture texture;
+    FlatThings flat;
     PixelNoise noise;
     HardShadows::Known hard;
     int64_t frames;

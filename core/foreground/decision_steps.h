@@ -49,6 +49,11 @@ struct DecisionConstants {
   // The newest distance counts at least one in so many there.
   double texture_samples = 50;
 
+  // ---- FlatThings ----
+  // A block is flat below this share of its usual contrast. Flat blocks that differ by fewer levels
+  // of brightness are one thing, from so many blocks on.
+  double flat = 0.4, same_brightness = 8, least_flat = 24;
+
   // ---- Light ----
   LightRange light;
   // Levels: a background so bright in unit light is at least that: its samples were clipped.
@@ -70,6 +75,7 @@ struct DecisionSteps {
   bool vote = true;
   bool specks = true;  // Specks; only after a vote
   bool hard = true;    // HardShadows
+  bool flat = true;    // FlatThings; only with textures
   DecisionConstants constants = {};
 };
 

@@ -107,10 +107,11 @@ struct Plan {
   std::function<double(double time)> metered;
 
   // Set by effects.
-  double pace = 0;     // seconds of the scene between frames; 0: interval
-  int64_t length = 0;  // frames; 0: endless
-  double pause = 0;    // seconds that the mover of the default scene stands in the middle
-  Dress dress;         // what objects wear; empty: their own clothes
+  double pace = 0;      // seconds of the scene between frames; 0: interval
+  int64_t length = 0;   // frames; 0: endless
+  double pause = 0;     // seconds that the mover of the default scene stands in the middle
+  bool crossed = true;  // persons cross the frame, as in the default scene
+  Dress dress;          // what objects wear; empty: their own clothes
   std::vector<std::unique_ptr<Actor>> actors;
 };
 

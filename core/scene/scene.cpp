@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "core/scene/paint.h"
 
@@ -76,8 +77,10 @@ Scene::Scene(const SceneOptions& options, const std::vector<NamedEffect>& named)
     if (stages & kSensor) stages_.sensor.push_back(effect);
     if (stages & kLink) stages_.link.push_back(effect);
   }
-  plan_.actors.push_back(std::make_unique<Crossing>(options.width, options.height, plan_.pause,
-                                                    streams("mover"), plan_.dress));
+  // It draws its numbers in any case: an effect changes no other's.
+  auto mover = std::make_unique<Crossing>(options.width, options.height, plan_.pause,
+                                          streams("mover"), plan_.dress);
+  if (plan_.crossed) plan_.actors.push_back(std::move(mover));
 
   state_.width = options.width;
   state_.height = options.height;

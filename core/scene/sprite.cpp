@@ -106,6 +106,24 @@ Sprite draw_lorry(int width, int height, const Colour& paint_colour) {
   return rasterize(width, height, paint_colour, paint);
 }
 
+Sprite draw_boat(int width, int height, const Colour& paint_colour, std::span<const Colour> coats) {
+  const auto paint = [&](double u, double v) -> std::optional<Colour> {
+    // The hull narrows downwards.
+    if (v > 0.6)
+      return std::abs(u - 0.5) < 0.5 - 0.2 * (v - 0.6) ? std::optional(paint_colour) : std::nullopt;
+    const double place = u * static_cast<double>(coats.size());
+    const auto person = static_cast<size_t>(place);
+    if (person >= coats.size()) return std::nullopt;
+    // Shares of the height from the middle of the person.
+    const double beside = (place - std::floor(place) - 0.5) / static_cast<double>(coats.size()) *
+                          width / std::max(height, 1);
+    if (in_ellipse(beside, v, 0, 0.12, 0.11, 0.12)) return Colour{190, 150, 125};
+    if (v > 0.22 && std::abs(beside) < 0.18) return coats[person];
+    return std::nullopt;
+  };
+  return rasterize(width, height, paint_colour, paint);
+}
+
 Sprite draw_bag(int height, const Colour& leather) {
   const auto paint = [&](double u, double v) -> std::optional<Colour> {
     const bool handle =

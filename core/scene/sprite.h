@@ -2,6 +2,7 @@
 // Figures that move through a scene: opaque pixels with hard edges, drawn once.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/scene/raster.h"
@@ -33,6 +34,8 @@ Sprite draw_person(int height, const Colour& coat, const Colour& trousers, doubl
 Sprite draw_van(int width, int height, const Colour& paint);
 // A lorry that fills its rectangle: every pixel is opaque.
 Sprite draw_lorry(int width, int height, const Colour& paint);
+// A long, flat boat of one colour, in which people sit, each in a coat.
+Sprite draw_boat(int width, int height, const Colour& paint, std::span<const Colour> coats);
 // A bag that somebody may leave.
 Sprite draw_bag(int height, const Colour& leather);
 // A leaf near the camera: `length` pixels from stalk to tip, turned by `angle` radians, with ribs.

@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Hard shadows: what is taken out of a mask, against a slow reference; floors with shadows and
-// things; a simulated street in the sun.
+// things.
 #include "core/foreground/hard_shadows.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <queue>
-#include <string>
 #include <tuple>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "core/engine/engine.h"
-#include "core/scene/scene.h"
 #include "gtest/gtest.h"
 #include "tests/core/mask_util.h"
 
@@ -344,69 +340,6 @@ TEST(HardShadows, HaveTheBackgroundsTextureAndTheSkysColour) {
                        put(area, {60, 50, 40}, frame, mask);
                      }),
             0);
-}
-
-// ---- A street in the sun ----
-
-struct Taken {
-  double shadow, people;  // shares of the labels that are white
-};
-
-Taken taken_in(const std::string& text, uint64_t seed) {
-  constexpr int kWidth = 320, kHeight = 240, kFrames = 130;
-  constexpr size_t kFirst = 30;
-  scene::SceneOptions scene_options;
-  scene_options.seed = seed;
-  scene::Scene scene(scene_options, text);
-  EngineOptions options;
-  options.window_size = 60;
-  Engine engine;
-  EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
-  const auto view_of = [](auto* rgb) {
-    BasicImageView<std::remove_pointer_t<decltype(rgb)>> view;
-    for (int c = 0; c < 3; ++c) view.channel[c] = rgb + c;
-    view.width = kWidth, view.height = kHeight;
-    view.pixel_stride = 3, view.row_stride = 3 * kWidth;
-    return view;
-  };
-  std::vector<std::vector<uint8_t>> labels;
-  std::vector<uint8_t> mask(size_t{3} * kWidth * kHeight);
-  size_t popped = 0;
-  double pixels[2] = {}, white[2] = {};  // of shadows and of people
-  const auto pop = [&] {
-    for (; engine.next(); ++popped) {
-      engine.next()->pop(Output::mask, view_of(mask.data()));
-      if (popped < kFirst) continue;
-      for (size_t p = 0; p < labels[popped].size(); ++p)
-        for (const auto& [which, label] :
-             {std::pair{0, scene::kShadowLabel}, {1, scene::kObjectLabel}}) {
-          if (labels[popped][p] != label) continue;
-          ++pixels[which];
-          white[which] += mask[3 * p] == 255;
-        }
-    }
-  };
-  for (int t = 0; t < kFrames; ++t) {
-    scene.render(t, scene::kFrame | scene::kLabels);
-    labels.push_back(scene.labels().samples);
-    EXPECT_TRUE(engine.push(view_of(std::as_const(scene.frame()).samples.data())).ok());
-    pop();
-  }
-  EXPECT_TRUE(engine.drain().ok());
-  pop();
-  EXPECT_GT(pixels[0], 20000);
-  EXPECT_GT(pixels[1], 100000);
-  return {white[0] / pixels[0], white[1] / pixels[1]};
-}
-
-TEST(HardShadows, AreNoForegroundInASimulatedStreet) {
-  for (const char* shadow : {"shadow=0.65:length=0.9:softness=2", "shadow=0.8:length=0.9",
-                             "shadow=0.75:length=0.9:blue=0.1"}) {
-    SCOPED_TRACE(shadow);
-    const Taken taken = taken_in(std::string("basic,bootstrap=3,") + shadow, 14);
-    EXPECT_LT(taken.shadow, 0.4);
-    EXPECT_GT(taken.people, 0.96);
-  }
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ std::vector<Variant> variants() {
                      run_engine(clip, mode, steps, shadows, see);
                    }});
   };
-  const DecisionSteps alone = {false, false, false, false, false, false, false};
+  const DecisionSteps alone = {false, false, false, false, false, false, false, false};
   for (auto [name, mode] : {std::pair{"default", Mode::batch}, {"mode=live", Mode::live}}) {
     const std::string of = name;
     add(of, mode, {}, Shadows::background);
@@ -76,7 +76,8 @@ std::vector<Variant> variants() {
         {"light", &DecisionSteps::light},
         {"vote, specks and holes", &DecisionSteps::vote},
         {"specks and holes", &DecisionSteps::specks},
-        {"hard shadows", &DecisionSteps::hard}};
+        {"hard shadows", &DecisionSteps::hard},
+        {"flat things", &DecisionSteps::flat}};
     for (const auto& [step, member] : steps) {
       DecisionSteps without;
       without.*member = false;
@@ -118,7 +119,7 @@ double score(const LabelledClip& clip, const Variant& variant) {
 void write_sheet(const LabelledClip& clip, const std::vector<size_t>& shown,
                  const std::string& file) {
   std::vector<std::vector<cv::Mat>> columns(2);
-  const DecisionSteps alone = {false, false, false, false, false, false, false};
+  const DecisionSteps alone = {false, false, false, false, false, false, false, false};
   for (size_t i = 0; i < 2; ++i)
     run_engine(clip, Mode::batch, i == 0 ? alone : DecisionSteps(),
                i == 0 ? Shadows::foreground : Shadows::background,

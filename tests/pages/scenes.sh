@@ -19,6 +19,7 @@ frame_of() {
     abandon) echo 90 ;;
     remove | intermittent-motion | intermittent-object-motion) echo 190 ;;
     stand | leave) echo 110 ;;
+    boat) echo 210 ;;
     fog) echo 130 ;;
     bands) echo 61 ;;
     fade) echo 180 ;;

@@ -7,7 +7,7 @@
 namespace qdmd::scene {
 
 extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kStand, kLeave,
-    kClutter, kBootstrap, kFoliage, kLeaves, kTrees, kWater, kFlicker, kShadow, kMirror,
+    kClutter, kBootstrap, kFoliage, kLeaves, kTrees, kWater, kBoat, kFlicker, kShadow, kMirror,
     kMotionBlur, kRain, kSnow, kFog, kDefocus, kJitter, kFade, kLightSwitch, kLamp, kHeadlights,
     kCloud, kNight, kBands, kExposure, kFocusSearch, kNoise, kInfrared, kCompression, kLostBlocks,
     kSmear, kLostSignal, kFrozen;
