@@ -142,6 +142,8 @@ bool WindowSolve::leave_out_disturbed(const WindowLight& light, const GridFrames
   std::vector<double> sorted = shares;
   const auto middle = sorted.begin() + static_cast<ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
+  // Behind leaves frames are always so.
+  if (*middle > steps::disturbance::kLeast) return false;
   const double most = *middle + steps::disturbance::kLeast;
   // Objects come and go in steps.
   std::vector<uint8_t> disturbed(shares.size());
