@@ -157,7 +157,17 @@ TEST(Ignored, TeachesNothing) {
     size_t taught = 0, wrong = 0;
     for (int t = 0; t < 20; ++t) {
       Floor frame = with_noise(floor, 6, rng);
-      frame.paint({60 + t, 40, 140, 60}, {170, 100, 110});
+      const Rectangle thing = {60 + t, 40, 140, 60};
+      frame.paint(thing, {170, 100, 110});
+      // Flat things are told by their look.
+      for (int y = thing.y; y < thing.y + thing.height; ++y)
+        for (int x = thing.x; x < thing.x + thing.width; ++x) {
+          const auto grain = static_cast<int>(rng() % 81) - 40;
+          for (auto& plane : frame.level) {
+            uint8_t& sample = plane[frame.index(x, y)];
+            sample = static_cast<uint8_t>(sample + grain);
+          }
+        }
       const auto expected = quiet.mask_of(frame), mask = busy.mask_of(frame),
                  other = heedless.mask_of(frame);
       for (int y = area.y + 5; y < area.y + area.height - 5; ++y)

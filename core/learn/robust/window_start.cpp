@@ -37,12 +37,13 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   const auto find_light = [&] {
     light = light_of(cells_of_shown(), static_cast<int>(shown_.size()), context_.room.pool, &here);
   };
-  if (shown_.empty())
-    here = known.earlier->cells();
-  else
-    find_light();
   const bool nothing_known = !known.earlier->known() || known.history->young();
-  if (nothing_known && leave_out_disturbed(light, here)) find_light();
+  if (shown_.empty()) {
+    here = known.earlier->cells();
+  } else {
+    find_light();
+    if (nothing_known && leave_out_disturbed(light, here)) find_light();
+  }
   const int shown = static_cast<int>(shown_.size());
   const GridPictures frames = cells_of_shown();
   gains_.assign(static_cast<size_t>(m), kSameLight);
@@ -117,7 +118,7 @@ GridPictures WindowSolve::cells_of_shown() const {
 
 // In a first window nobody knows yet what is usual: most of its frames say that. Frames that differ
 // from the median in much more of the picture, from one frame to the next, say nothing of the
-// background (disturbances.h). They are fewer than half. median: of those in shown_, in unit light.
+// background (disturbances.h). They are a third at most. median: of those in shown_, in unit light.
 // False where there are none.
 bool WindowSolve::leave_out_disturbed(const WindowLight& light, const GridFrames& median) {
   const size_t cells = context_.grid.cells();
@@ -156,8 +157,12 @@ bool WindowSolve::leave_out_disturbed(const WindowLight& light, const GridFrames
     if (begins || ends) std::fill_n(disturbed.data() + first, end - first, uint8_t{1});
     first = std::max(end, first + 1);
   }
+  // What most frames show may be somebody who stands there.
+  const auto all = std::count(disturbed.begin(), disturbed.end(), 1);
+  if (all == 0 || 3 * all > std::ssize(disturbed)) return false;
   size_t i = 0;
-  return std::erase_if(shown_, [&](int) { return disturbed[i++] != 0; }) > 0;
+  std::erase_if(shown_, [&](int) { return disturbed[i++] != 0; });
+  return true;
 }
 
 bool WindowSolve::is_shown(int64_t number) const {
