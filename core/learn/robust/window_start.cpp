@@ -146,15 +146,22 @@ bool WindowSolve::leave_out_disturbed(const WindowLight& light, const GridFrames
   // Behind leaves frames are always so.
   if (*middle > steps::disturbance::kLeast) return false;
   const double most = *middle + steps::disturbance::kLeast;
-  // Objects come and go in steps.
+  // Objects come and go in steps. What was there before the window, or is after it, may stand there
+  // for long, unless it is more than an object.
   std::vector<uint8_t> disturbed(shares.size());
   for (size_t first = 0; first < shares.size();) {
     size_t end = first;
     while (end < shares.size() && shares[end] > most) ++end;
-    using steps::disturbance::kAtOnce;
-    const bool begins = first > 0 && shares[first] - shares[first - 1] > kAtOnce,
-               ends = end > first && end < shares.size() && shares[end - 1] - shares[end] > kAtOnce;
-    if (begins || ends) std::fill_n(disturbed.data() + first, end - first, uint8_t{1});
+    using steps::disturbance::kAtOnce, steps::proofs::kMostOfPicture;
+    if (end > first) {
+      const bool begins = first > 0 && shares[first] - shares[first - 1] > kAtOnce,
+                 ends = end < shares.size() && shares[end - 1] - shares[end] > kAtOnce;
+      const double least = *std::min_element(shares.begin() + static_cast<ptrdiff_t>(first),
+                                             shares.begin() + static_cast<ptrdiff_t>(end));
+      const bool is_all = (begins || ends) && least - *middle > kMostOfPicture;
+      if ((begins && ends) || is_all)
+        std::fill_n(disturbed.data() + first, end - first, uint8_t{1});
+    }
     first = std::max(end, first + 1);
   }
   // What most frames show may be somebody who stands there.
