@@ -200,7 +200,7 @@ QDMD_STEP int64_t kLasts = step("proofs.lasts", int64_t{75});
 QDMD_STEP float kDarkestShade = step("proofs.darkest_shade", 0.5f);
 QDMD_STEP float kShadeRest = step("proofs.shade_rest", 12.0f);
 // Frames: a scene is young for so long (mode=live); and a place until so many have shown its
-// background.
+// background, or kLasts of most.
 QDMD_STEP int64_t kYoungFrames = step("proofs.young_frames", int64_t{200});
 }  // namespace proofs
 

@@ -47,7 +47,8 @@ struct Proofs {
 // | most of the picture differs                                        | nothing, for kLasts;    |
 // |                                                                    |   then left: no object  |
 // | there, the background in less light                                | shaded: older look stays|
-// | anything else, for 3 kMoves frames                                 | came: older look stays  |
+// | anything else, for 3 kMoves frames                                 | came: older look stays, |
+// |                                                                    |   if it is known        |
 // | the scene is young (mode=live)                                     | contours alone decide   |
 class SceneMemory {
  public:
