@@ -29,61 +29,44 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
     : grid_(grid),
       looks_(grid),
       uncovered_(grid.cells()),
-      of_(grid.cells()),
-      since_(grid.cells()),
-      left_(grid.cells(), StandingLooks::kNever),
+      said_(grid.cells()),
+      shown_(grid.cells()),
       differs_(grid.cells()),
       unjudged_(grid.cells()),
       marks_(grid.cells()),
-      shown_(grid.cells()),
-      others_(grid.cells()),
       young_frames_(young_frames) {
-  for (std::vector<float>& levels : background_) levels.resize(grid.cells());
   found_.reserve(grid.cells());
   around_.reserve(grid.cells());
   differing_.reserve(grid.cells());
 }
 
 uint64_t SceneMemory::bytes(const Grid& grid) {
-  return StandingLooks::bytes(grid) + HistoryStarts::bytes(grid.cells()) +
-         grid.cells() * (4 * sizeof(uint8_t) + 2 * sizeof(int64_t) + 5 * sizeof(int) +
-                         kChannels * sizeof(float));
+  const uint64_t cells = grid.cells();
+  return StandingLooks::bytes(grid) + HistoryStarts::bytes(cells) + Judgements::bytes(cells) +
+         ShownCounts::bytes(cells) + cells * (3 * sizeof(uint8_t) + 3 * sizeof(int));
 }
 
 void SceneMemory::forget() {
   followed_ = 0;
   looks_.forget();
   uncovered_.forget();
-  std::fill(of_.begin(), of_.end(), Of::none);
+  said_.forget();
+  shown_.forget();
   std::fill(differs_.begin(), differs_.end(), uint8_t{0});
-  std::fill(left_.begin(), left_.end(), StandingLooks::kNever);
-  std::fill(shown_.begin(), shown_.end(), 0);
-  std::fill(others_.begin(), others_.end(), 0);
-  newest_left_ = StandingLooks::kNever;
-  news_ = grown_up_ = false;
+  news_ = false;
 }
 
 void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
   const int at = static_cast<int>(cell);
   looks_.write(cell, now, out);
-  // What solves know of what left is in the earlier window.
-  const bool is_known = of_[cell] == Of::came || (of_[cell] == Of::left && uncovered_.is_news(at));
-  if (out->since != LearntPlace::kNever && is_known && since_[cell] >= looks_.since(at)) {
-    out->judgement = of_[cell] == Of::came ? LearntPlace::kCame : LearntPlace::kLeft;
-    out->judged_since = frames_ago(since_[cell], now);
-  }
-  if (left_[cell] != StandingLooks::kNever) out->left = frames_ago(left_[cell], now);
+  said_.write(at, now, looks_.since(at), uncovered_.is_news(at), out);
 }
 
 bool SceneMemory::read(size_t cell, int64_t now, const LearntPlace& from) {
-  constexpr Of kJudgements[] = {Of::none, Of::came, Of::left};
-  static_assert(LearntPlace::kCame == 1 && LearntPlace::kLeft == 2);
   if (!looks_.read(cell, now, from)) return false;
-  of_[cell] = kJudgements[from.judgement];
-  since_[cell] = now - from.judged_since;
-  left_[cell] = from.left == LearntPlace::kNever ? StandingLooks::kNever : now - int64_t{from.left};
-  newest_left_ = std::max(newest_left_, left_[cell]);
-  if (of_[cell] == Of::left) uncovered_.add(static_cast<int>(cell), since_[cell]);
+  const int at = static_cast<int>(cell);
+  said_.read(at, now, from);
+  if (from.judgement == LearntPlace::kLeft) uncovered_.add(at, said_.since(at));
   return true;
 }
 
@@ -155,12 +138,10 @@ SceneMemory::Motion SceneMemory::motion_around(const std::vector<int>& region,
 
 void SceneMemory::decide(const std::vector<int>& region, Of of) {
   for (int cell : region) {
-    const auto at = static_cast<size_t>(cell);
-    of_[at] = of;
-    since_[at] = looks_.since(cell);
+    said_.decide(cell, of, looks_.since(cell));
     if (of != Of::left) continue;
-    newest_left_ = left_[at] = looks_.newest();
-    uncovered_.add(cell, since_[at]);
+    said_.note_left(cell, looks_.newest());
+    uncovered_.add(cell, looks_.since(cell));
   }
 }
 
@@ -168,22 +149,18 @@ bool SceneMemory::left_beside(const std::vector<int>& region) const {
   bool found = false;
   for (int cell : region)
     each_near(cell, 1, [&](int near) {
-      const auto at = static_cast<size_t>(near);
-      if (left_[at] == StandingLooks::kNever || looks_.newest() - left_[at] > kPieces) return;
-      found |= looks_.newest() - left_[at] <= kMoves ||
-               (looks_.before_until(cell) != StandingLooks::kNever &&
-                std::abs(looks_.before_until(cell) - since_[at]) <= kMoves);
+      if (said_.left(near) == Judgements::kNever) return;
+      const int64_t ago = looks_.newest() - said_.left(near);
+      if (ago > kPieces) return;
+      found |= ago <= kMoves || (looks_.before_until(cell) != StandingLooks::kNever &&
+                                 std::abs(looks_.before_until(cell) - said_.since(near)) <= kMoves);
     });
   return found;
 }
 
 bool SceneMemory::came_beside(const std::vector<int>& region) const {
   bool found = false;
-  for (int cell : region)
-    each_near(cell, 1, [&](int near) {
-      const auto at = static_cast<size_t>(near);
-      found |= of_[at] == Of::came && since_[at] >= looks_.since(near);
-    });
+  for (int cell : region) each_near(cell, 1, [&](int near) { found |= of(near) == Of::came; });
   return found;
 }
 
@@ -250,9 +227,9 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
     return left;
   }
   looks_.find_differing(background, &differs_, &differing_);
-  count_shown(background);
+  shown_.count(looks_, differs_, background);
   const bool any_left =
-      newest_left_ != StandingLooks::kNever && looks_.newest() - newest_left_ <= kPieces;
+      said_.newest_left() != Judgements::kNever && looks_.newest() - said_.newest_left() <= kPieces;
   if (differing_.size() < kLeastRegion && (differing_.empty() || !any_left)) return found_;
   const auto news =
       static_cast<size_t>(std::count_if(differing_.begin(), differing_.end(), [&](int at) {
@@ -266,22 +243,17 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
   }
   // What was judged stays so as long as it is there.
   std::fill(unjudged_.begin(), unjudged_.end(), uint8_t{0});
-  for (int at : differing_) {
-    const auto cell = static_cast<size_t>(at);
-    if (since_[cell] < looks_.since(at)) of_[cell] = Of::none;
-    unjudged_[cell] = of_[cell] == Of::none;
-  }
+  for (int at : differing_)
+    unjudged_[static_cast<size_t>(at)] = said_.renewed(at, looks_.since(at)) == Of::none;
   CellRegions regions(grid_);
   for (const std::vector<int>& region : regions.find(unjudged_)) {
     judge(region, contours);
-    if (of_[static_cast<size_t>(region[0])] == Of::left)
-      found_.insert(found_.end(), region.begin(), region.end());
+    if (of(region[0]) == Of::left) found_.insert(found_.end(), region.begin(), region.end());
   }
   if (!found_.empty()) widen(background);
   // What passes before a cell may have hidden what is behind.
   for (int at : differing_)
-    if (!unjudged_[static_cast<size_t>(at)] && of_[static_cast<size_t>(at)] == Of::left)
-      found_.push_back(at);
+    if (!unjudged_[static_cast<size_t>(at)] && of(at) == Of::left) found_.push_back(at);
   return found_;
 }
 
@@ -311,13 +283,10 @@ void SceneMemory::leave_out_shaded(const float* const background[3]) {
 // lasts is background.
 void SceneMemory::judge_as_one() {
   for (int at : differing_) {
-    const auto cell = static_cast<size_t>(at);
-    if (looks_.newest() - looks_.since(at) < kLasts) continue;
-    if (of_[cell] != Of::left || since_[cell] < looks_.since(at)) {
-      of_[cell] = Of::left;
-      since_[cell] = looks_.since(at);
-      uncovered_.add(at, since_[cell]);
-    }
+    const int64_t since = looks_.since(at);
+    if (looks_.newest() - since < kLasts || of(at) == Of::left) continue;
+    said_.decide(at, Of::left, since);
+    uncovered_.add(at, since);
   }
 }
 
@@ -326,38 +295,6 @@ float SceneMemory::apart(int cell, const float* const background[3]) const {
   for (int c = 0; c < kChannels; ++c)
     sum += std::abs(looks_.level(cell, c) - background[c][static_cast<size_t>(cell)]);
   return sum;
-}
-
-// Another background begins with the frames of the look that it has.
-void SceneMemory::count_shown(const float* const background[3]) {
-  for (size_t cell = 0; cell < shown_.size(); ++cell) {
-    float moved = 0;
-    for (size_t c = 0; c < kChannels; ++c) {
-      moved += std::abs(background[c][cell] - background_[c][cell]);
-      background_[c][cell] = background[c][cell];
-    }
-    const int at = static_cast<int>(cell);
-    const bool shows = !differs_[cell] && looks_.shows_look(at);
-    if (grown_up_) {
-      shown_[cell] = static_cast<int>(kYoungFrames);
-    } else if (moved >= StandingLooks::kSame) {
-      shown_[cell] = shows ? looks_.frames(at) : 0;
-      others_[cell] = 0;
-    } else {
-      shown_[cell] += shows;
-      others_[cell] += differs_[cell];
-    }
-  }
-  grown_up_ = false;
-}
-
-// Lorries may have hidden most of a street for the whole of a window: nothing is known of a place
-// until many frames have shown its background, or three seconds of frames which are most of those
-// before the look that is there now. Until then the look counts that more frames show.
-bool SceneMemory::is_known(size_t cell) const {
-  const int64_t now = looks_.newest() - looks_.since(static_cast<int>(cell)) + 1;
-  return shown_[cell] >= kYoungFrames ||
-         (shown_[cell] >= kLasts && shown_[cell] >= 2 * (others_[cell] - now));
 }
 
 // What left reaches into the cells around.
@@ -371,7 +308,7 @@ void SceneMemory::widen(const float* const background[3]) {
       each_near(found_[i], 1, [&](int near) {
         const auto at = static_cast<size_t>(near);
         if (marks_[at] || !looks_.shows_look(near)) return;
-        if (of_[at] == Of::came && since_[at] >= looks_.since(near)) return;
+        if (of(near) == Of::came) return;
         const bool shows_it = apart(near, background) >= StandingLooks::kSame;
         if (step > 0 && !shows_it) return;
         marks_[at] = 1;
@@ -381,9 +318,9 @@ void SceneMemory::widen(const float* const background[3]) {
           return;
         }
         // It shows too little of it to have changed its look.
-        of_[at] = Of::left;
-        since_[at] = since_[static_cast<size_t>(found_[i])];
-        uncovered_.add(near, since_[at]);
+        const int64_t since = said_.since(found_[i]);
+        said_.decide(near, Of::left, since);
+        uncovered_.add(near, since);
       });
     first = end;
   }
@@ -394,24 +331,24 @@ void SceneMemory::hand_over(Proofs* solve) {
   solve->young = young();
   std::fill(solve->came.begin(), solve->came.end(), uint8_t{0});
   if (solve->young) return;
-  for (size_t cell = 0; cell < of_.size(); ++cell) {
+  for (size_t cell = 0; cell < marks_.size(); ++cell) {
     const int at = static_cast<int>(cell);
-    const Of of = since_[cell] >= looks_.since(at) ? of_[cell] : Of::none;
-    marks_[cell] = of == Of::came || (of == Of::none && differs_[cell]);
-    if (!marks_[cell] || !is_known(cell)) {
+    const Of said = of(at);
+    marks_[cell] = said == Of::came || (said == Of::none && differs_[cell]);
+    if (!marks_[cell] || !shown_.is_known(cell, looks_.newest() - looks_.since(at) + 1)) {
       marks_[cell] = 0;
       continue;
     }
     solve->any = true;
     solve->came[cell] = 1;
-    solve->since[cell] = of == Of::came ? since_[cell] : Proofs::kUnsure;
+    solve->since[cell] = said == Of::came ? said_.since(at) : Proofs::kUnsure;
   }
   // What stands there reaches into the cells around.
-  for (size_t cell = 0; cell < of_.size(); ++cell)
+  for (size_t cell = 0; cell < marks_.size(); ++cell)
     if (marks_[cell])
       each_near(static_cast<int>(cell), kRim, [&](int near) {
         const auto at = static_cast<size_t>(near);
-        if (solve->came[at] || (of_[at] == Of::left && since_[at] >= looks_.since(near))) return;
+        if (solve->came[at] || of(near) == Of::left) return;
         solve->came[at] = 1;
         solve->since[at] = solve->since[cell];
       });

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "core/learn/robust/history_starts.h"
+#include "core/learn/robust/judgements.h"
 #include "core/learn/robust/region_contours.h"
+#include "core/learn/robust/shown_counts.h"
 #include "core/learn/robust/standing_looks.h"
 
 namespace qdmd {
@@ -65,7 +67,7 @@ class SceneMemory {
   // Somebody else has seen enough frames: neither the scene nor its places are young.
   void grow_up() {
     followed_ = std::max(followed_, young_frames_);
-    grown_up_ = true;
+    shown_.grow_up();
   }
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
@@ -94,8 +96,7 @@ class SceneMemory {
   HistoryStarts& uncovered() { return uncovered_; }
 
  private:
-  // What is known of a cell's look: nothing yet; it came; it was behind what has left.
-  enum class Of : uint8_t { none, came, left };
+  using Of = Judgements::Of;
   // The share of the cells around a region before which something passes, a frame's mean, in the
   // frames before and after it changed; and of those next to it now.
   struct Motion {
@@ -121,24 +122,17 @@ class SceneMemory {
   bool is_most_of_picture() const;
   void judge_as_one();
   float apart(int cell, const float* const background[3]) const;
-  void count_shown(const float* const background[3]);
-  bool is_known(size_t cell) const;
+  // What was said of what the cell shows now.
+  Of of(int cell) const { return said_.of(cell, looks_.since(cell)); }
   template <typename What>
   void each_near(int cell, int reach, const What& what) const;
 
   Grid grid_;
   StandingLooks looks_;
   HistoryStarts uncovered_;
-  // By cells: the newest judgement, the frame with which the look came that it is about, and the
-  // frame in which something was last found to have left.
-  std::vector<Of> of_;
-  std::vector<int64_t> since_, left_;
-  int64_t newest_left_ = StandingLooks::kNever;
-  std::vector<uint8_t> differs_, unjudged_, marks_;
-  // By cells: the background, and how many frames have shown it, or another look.
-  std::array<std::vector<float>, kChannels> background_;
-  std::vector<int> shown_, others_;
-  bool grown_up_ = false;
+  Judgements said_;
+  ShownCounts shown_;
+  std::vector<uint8_t> differs_, unjudged_, marks_;  // by cells
   std::vector<int> found_, around_, differing_;
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;

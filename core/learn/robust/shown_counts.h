@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// How often each cell has shown its background, and other looks: enough frames make it known.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/standing_looks.h"
+
+namespace qdmd {
+
+class ShownCounts {
+ public:
+  ShownCounts() = default;
+  // Takes all memory.
+  explicit ShownCounts(size_t cells) : shown_(cells), others_(cells) {
+    for (std::vector<float>& levels : background_) levels.resize(cells);
+  }
+  static uint64_t bytes(uint64_t cells) {
+    return cells * (2 * sizeof(int) + kChannels * sizeof(float));
+  }
+
+  void forget() {
+    std::fill(shown_.begin(), shown_.end(), 0);
+    std::fill(others_.begin(), others_.end(), 0);
+    grown_up_ = false;
+  }
+  // Somebody else has seen enough frames: the next background is known in all cells.
+  void grow_up() { grown_up_ = true; }
+  // Counts the newest frame of `looks`. differs: by cells, as StandingLooks::find_differing.
+  // Another background begins with the frames of the look that it has.
+  void count(const StandingLooks& looks, const std::vector<uint8_t>& differs,
+             const float* const background[3]) {
+    for (size_t cell = 0; cell < shown_.size(); ++cell) {
+      float moved = 0;
+      for (size_t c = 0; c < kChannels; ++c) {
+        moved += std::abs(background[c][cell] - background_[c][cell]);
+        background_[c][cell] = background[c][cell];
+      }
+      const int at = static_cast<int>(cell);
+      const bool shows = !differs[cell] && looks.shows_look(at);
+      if (grown_up_) {
+        shown_[cell] = static_cast<int>(steps::proofs::kYoungFrames);
+      } else if (moved >= StandingLooks::kSame) {
+        shown_[cell] = shows ? looks.frames(at) : 0;
+        others_[cell] = 0;
+      } else {
+        shown_[cell] += shows;
+        others_[cell] += differs[cell];
+      }
+    }
+    grown_up_ = false;
+  }
+  // Lorries may have hidden most of a street for the whole of a window: nothing is known of a place
+  // until many frames have shown its background, or three seconds of frames which are most of those
+  // before the look that is there now. now: for how many frames that look has been there.
+  bool is_known(size_t cell, int64_t now) const {
+    return shown_[cell] >= steps::proofs::kYoungFrames ||
+           (shown_[cell] >= steps::proofs::kLasts && shown_[cell] >= 2 * (others_[cell] - now));
+  }
+
+ private:
+  std::array<std::vector<float>, kChannels> background_;
+  std::vector<int> shown_, others_;
+  bool grown_up_ = false;
+};
+
+}  // namespace qdmd
