@@ -46,11 +46,12 @@ void set_load_location(GObject* object, const GValue* value) {
 // Without locks.
 void warn_of_rectangles(GstElement* self, guint left_out) {
   if (left_out > 0)
-    GST_ELEMENT_WARNING(self, LIBRARY, SETTINGS,
-                        ("ignore leaves out %u rectangles. Each must have four whole numbers, x, "
-                         "y, width and height, the last two above 0. There can be %u at most.",
-                         left_out, guint(IgnoredAreas::kMost)),
-                        (nullptr));
+    GST_ELEMENT_WARNING(
+        self, LIBRARY, SETTINGS,
+        ("ignore leaves out %u %s. Each must have four whole numbers, x, "
+         "y, width and height, the last two above 0. There can be %u at most.",
+         left_out, left_out == 1 ? "rectangle" : "rectangles", guint(IgnoredAreas::kMost)),
+        (nullptr));
 }
 
 void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {

@@ -16,6 +16,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import os
+import warnings
 from typing import Any, Iterable, Iterator, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -103,16 +104,18 @@ class Separator:
         if not absorb_time >= 0 or not frame_rate > 0:
             raise ValueError('absorb_time must be 0 (never) or more seconds, and frame_rate above 0')
         absorb_frames = max(1, round(min(absorb_time * frame_rate, 2e9))) if absorb_time > 0 else 0
+        areas = _rectangles(ignore)
         self._native = _native.Separator(dict(
             mode=mode, method=method, window_size=window_size, hop_size=hop_size, rank=rank,
             omega_threshold=omega_threshold, amplitude=amplitude, solver=solver, estimator=estimator,
             sample_step=sample_step, iterations=iterations, stabilize=stabilize, stabilize_output=stabilize_output,
             foreground_threshold=foreground_threshold, shadows=shadows, mask_softness=mask_softness,
-            ignore=_rectangles(ignore), absorb_frames=absorb_frames, frame_rate=frame_rate,
+            ignore=areas, absorb_frames=absorb_frames, frame_rate=frame_rate,
             time_budget=time_budget, mask_scale=mask_scale, n_threads=n_threads, max_memory=max_memory,
             window_on_disk=os.fspath(window_on_disk or '')), depth, bgr)
         self._delay = window_size - 1 if mode == 'batch' else 0
         self._waiting = 0
+        self._new_areas = areas  # no frame has been seen with them
         if load_location is not None:
             self.load(load_location)
 
@@ -127,6 +130,8 @@ class Separator:
         mask: an array in which to write it, which saves the time for a new one. mode='live' only. The first mask is
         empty, since nothing is known yet.
         """
+        if self._new_areas:
+            self._warn_of_areas(frame)
         return self._native.apply(frame, mask)
 
     def background(self) -> Optional[Frame]:
@@ -164,6 +169,8 @@ class Separator:
 
     def push(self, frame: Frame) -> None:
         """A frame goes in. While `ready`, take pictures of the frames that come out, and skip() each."""
+        if self._new_areas:
+            self._warn_of_areas(frame)
         self._native.push(frame)
         self._waiting += 1
 
@@ -198,7 +205,20 @@ class Separator:
 
     def ignore(self, rectangles: Iterable[Rectangle]) -> None:
         """The setting `ignore`, from the next frame on."""
-        self._native.ignore(_rectangles(rectangles))
+        areas = _rectangles(rectangles)
+        self._native.ignore(areas)
+        self._new_areas = areas
+
+    def _warn_of_areas(self, frame: Frame) -> None:
+        """Where rectangles of `ignore` have no pixel of a frame, as often as they are set."""
+        if np.ndim(frame) < 2:
+            return
+        height, width = np.shape(frame)[:2]
+        outside = [area for area in self._new_areas
+                   if area[0] >= width or area[1] >= height or area[0] + area[2] <= 0 or area[1] + area[3] <= 0]
+        self._new_areas = []
+        if outside:
+            warnings.warn(f'ignore has {outside} outside of the frame, which is {width}x{height}', stacklevel=3)
 
     def reset(self) -> None:
         """Forgets the frames, the window and the background."""

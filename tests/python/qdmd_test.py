@@ -9,6 +9,7 @@ import threading
 import time
 import types
 import typing
+import warnings
 
 import numpy as np
 import pytest
@@ -217,6 +218,21 @@ def test_a_time_lapse_is_told_by_its_rate():
         return np.mean(share)
 
     assert found(1) > 0.97 and found(25) < found(1) - 0.02
+
+
+def test_says_once_what_ignore_has_outside_of_the_frame():
+    frame = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    separator = qdmd.Separator(window_size=4, ignore=[(0, 0, 1, 1), (WIDTH, 0, 5, 5), (-5, 0, 5, 5)])
+    with pytest.warns(UserWarning, match=rf'\({WIDTH}, 0, 5, 5\), \(-5, 0, 5, 5\)\] outside .* {WIDTH}x{HEIGHT}'):
+        separator.apply(frame)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        separator.apply(frame)
+        separator.ignore([(-5, -5, 6, 6)])
+        separator.apply(frame)
+    separator.ignore([(0, HEIGHT, 1, 1)])
+    with pytest.warns(UserWarning, match='outside'):
+        separator.push(frame)
 
 
 def test_ignore_and_freeze_hold_from_the_next_frame():
