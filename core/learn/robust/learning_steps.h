@@ -34,7 +34,10 @@ QDMD_STEP float kMeasured = step("light.measured", 240.0f);
 // A window whose light changes by this factor while samples are at the end of their range is looked
 // at in the light of its darker frames: where this share of them is darker, and no darker than this
 // share of the usual light.
-QDMD_STEP float kSwings = step("light.swings", 1.1f), kDarker = step("light.darker", 0.1f);
+QDMD_STEP float kSwings = step("light.swings", 1.2f), kDarker = step("light.darker", 0.1f);
+// The same factor where more than this share of the cells is at the end.
+QDMD_STEP float kSwingsOfMany = step("light.swings_of_many", 1.1f);
+QDMD_STEP float kManyEnds = step("light.many_ends", 0.1f);
 QDMD_STEP float kDarkest = step("light.darkest", 0.5f);
 // Levels: a channel that is further from the background says that something else is there.
 QDMD_STEP float kOther = step("light.other", 20.0f);

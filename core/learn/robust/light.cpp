@@ -173,9 +173,16 @@ Gain without_tint(const Gain& gain) {
   return found;
 }
 
+// True where a frame that is so many times as bright as another one has enough cells at the end of
+// their range.
+bool swings(float brighter, const float* const frame[3], size_t cells) {
+  if (brighter <= kSwingsOfMany) return false;
+  const float ends = share_at_end(frame, cells);
+  return ends > kManyEnds || (ends > kEnds && brighter > kSwings);
+}
+
 bool at_end(const GridFrames& frames, int frame, const Gain& gain) {
-  return brightness(gain) > kSwings &&
-         share_at_end(CellPlanes(frames, frame).of, frames.cells()) > kEnds;
+  return swings(brightness(gain), CellPlanes(frames, frame).of, frames.cells());
 }
 
 Gain light_between(const GridFrames& frames, int frame, const GridFrames& background, int reference,
@@ -308,8 +315,8 @@ class FramesOfLight {
     const auto [least, most] = std::minmax_element(
         gains.begin(), gains.end(),
         [](const Gain& a, const Gain& b) { return brightness(a) < brightness(b); });
-    if (brightness(*most) < kSwings * brightness(*least)) return false;
-    return share_at_end(planes(static_cast<size_t>(most - gains.begin())).of, cells()) > kEnds;
+    return swings(brightness(*most) / brightness(*least),
+                  planes(static_cast<size_t>(most - gains.begin())).of, cells());
   }
 
  private:
