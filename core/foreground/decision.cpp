@@ -146,6 +146,7 @@ Decision::Decision(int width, int height, Colours colours, const DecisionSteps& 
       flat_(width, height, shape_.step, colours, steps.constants),
       noise_(width, height, steps.constants),
       hard_(width, height, shape_.step, steps.constants.hard),
+      overlays_(width, height, steps.constants),
       specks_(width, height),
       unknown_(static_cast<size_t>(shape_.strips)) {
   for (auto& level : of_.level) level.resize(shape_.padded(), 0);
@@ -162,7 +163,7 @@ uint64_t Decision::bytes(int width, int height) {
   return 5 * uint64_t{shape.padded()} + 2 * uint64_t{shape.pixels()} +
          MovingTexture::bytes(width, height) + FlatThings::bytes(width, height, shape.step) +
          PixelNoise::bytes(width, height) + HardShadows::bytes(width, height, shape.step) +
-         Specks::bytes(width, height);
+         Overlays::bytes(width, height) + Specks::bytes(width, height);
 }
 
 void Decision::forget() {
@@ -170,19 +171,21 @@ void Decision::forget() {
   flat_.forget();
   noise_.forget();
   hard_.forget();
+  overlays_.forget();
   frames_ = 0;
   grey_ = colours_ == Colours::grey;
 }
 
 void Decision::change_scene(bool returns) {
   if (!left_) {
-    left_ = Statistics{texture_, flat_, noise_, hard_.known(), frames_};
+    left_ = Statistics{texture_, flat_, noise_, hard_.known(), overlays_, frames_};
     returns = false;
   } else {
     std::swap(left_->texture, texture_);
     std::swap(left_->flat, flat_);
     std::swap(left_->noise, noise_);
     std::swap(left_->hard, hard_.known());
+    std::swap(left_->overlays, overlays_);
     std::swap(left_->frames, frames_);
   }
   if (!returns) forget();
@@ -247,6 +250,7 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
   }
   // Where a shadow was is no place to learn noise from. Much noise hides texture.
   if (steps_.hard && !now_.means && knows_light() && !much_moves()) leave_hard_shadows();
+  if (steps_.overlays && !frame.fixed) overlays_.take_out(mask);
   find_colour();
   ++frames_;
 }

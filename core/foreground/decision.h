@@ -17,6 +17,7 @@
 #include "core/foreground/flat_things.h"
 #include "core/foreground/hard_shadows.h"
 #include "core/foreground/moving_texture.h"
+#include "core/foreground/overlays.h"
 #include "core/foreground/pixel_noise.h"
 #include "core/foreground/specks.h"
 #include "core/model/background_model.h"
@@ -57,7 +58,8 @@ struct Comparison {
 //   - most of the pixels around it are background (vote_row), which makes a background pixel
 //     foreground, too,
 //   - it belongs to a part that is too small; holes that are too small are foreground (Specks),
-//   - it belongs to a region in much less light (HardShadows; as find_shaded).
+//   - it belongs to a region in much less light (HardShadows; as find_shaded),
+//   - it is text that a recorder draws (Overlays).
 // In much noise, means of 3 x 3 pixels are compared. Of samples of more than 8 bits a pixel's own
 // distance from L is that of whole samples; means, what is around, and light are compared in the
 // highest 8 bits, noise is learnt from them, and where the user's threshold is so low that these
@@ -176,11 +178,13 @@ class Decision {
   FlatThings flat_;
   PixelNoise noise_;
   HardShadows hard_;
+  Overlays overlays_;
   struct Statistics {
     MovingTexture texture;
     FlatThings flat;
     PixelNoise noise;
     HardShadows::Known hard;
+    Overlays overlays;
     int64_t frames;
   };
   std::optional<Statistics> left_;  // of the scene before

@@ -59,6 +59,12 @@ struct DecisionConstants {
   // Levels: a background so bright in unit light is at least that: its samples were clipped.
   float at_end = 253;
 
+  // ---- Overlays ----
+  // Text changes alone so many times before it is known, and nothing near it changes for so many
+  // frames before and after. Of what is white this share changes, and at most this share of the
+  // picture's blocks do.
+  double text_changes = 6, text_rests = 6, text_share = 0.3, most_text = 0.04;
+
   // ---- HardShadows ----
   HardShadowConstants hard;
 
@@ -76,15 +82,17 @@ struct DecisionSteps {
   bool specks = true;  // Specks; only after a vote
   bool hard = true;    // HardShadows
   bool flat = true;    // FlatThings; only with textures
+  bool overlays = true;
   DecisionConstants constants = {};
 };
 
 // The steps for frames that come at such a rate, in frames per second; 0: unknown. Where they are
 // far apart, as in a time lapse, most things that pass are in one frame: a moment says less of
-// noise, in proportion.
+// noise, in proportion; and they come and go at once, as text does, where motion cannot be seen.
 inline DecisionSteps at_rate(DecisionSteps steps, double frame_rate) {
-  constexpr double kSlow = 5;
+  constexpr double kSlow = 5, kShowsMotion = 10;
   if (frame_rate > 0 && frame_rate < kSlow) steps.constants.weight_of_moments *= frame_rate / kSlow;
+  if (frame_rate > 0 && frame_rate < kShowsMotion) steps.overlays = false;
   return steps;
 }
 

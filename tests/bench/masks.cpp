@@ -231,7 +231,7 @@ void add_all(const Size& size) {
       {"noise", &DecisionSteps::noise},   {"texture", &DecisionSteps::texture},
       {"light", &DecisionSteps::light},   {"vote", &DecisionSteps::vote},
       {"specks", &DecisionSteps::specks}, {"hard", &DecisionSteps::hard},
-      {"flat", &DecisionSteps::flat},
+      {"flat", &DecisionSteps::flat},     {"overlays", &DecisionSteps::overlays},
   };
   for (const auto& [name, step] : steps) {
     DecisionSteps without;

@@ -312,6 +312,9 @@ const Camera kCameras[] = {
               (1 + 0.25f * std::sin(2 * std::numbers::pi_v<float> * static_cast<float>(t) / 100));
      },
      100},
+    {"slow",
+     [](int t, size_t, float sample, float) { return sample * 1.3f * (1 + 0.08f * swing(t / 2)); },
+     100},
     {"start",
      [](int t, size_t, float sample, float) {
        return sample * (t < 50    ? 0.06f
@@ -407,6 +410,15 @@ TEST_P(CameraLight, MasksStayRight) {
       EXPECT_GE(f, 0.9) << camera.name << ", seed " << seed;
       EXPECT_LE(wrong, 10) << camera.name << ", seed " << seed;
     }
+}
+
+// A window of 50 sees half of a swing.
+TEST(ShortWindows, HalfASwingIsEnough) {
+  for (const int window : {25, 50}) {
+    const auto [f, wrong] = score(kCameras[0], robust_of(window), 3);
+    EXPECT_GE(f, 0.9) << window;
+    EXPECT_LE(wrong, 10) << window;
+  }
 }
 
 }  // namespace

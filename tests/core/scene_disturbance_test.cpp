@@ -180,5 +180,43 @@ TEST(SceneFrozen, TheFirstFrameIsSeenToTheEnd) {
     }
 }
 
+// ---- The clock ----
+
+TEST(SceneClock, ChangesOnceASecondInItsPlaceAndNoTruth) {
+  const std::string scene = "jitter,noise";
+  for (const auto& [name, left, top] :
+       {std::tuple{"clock", true, false}, {"clock=0.1:x=0:y=1", false, true}}) {
+    auto how = options(160, 120);
+    Scene with(how, scene + "," + name), plain(how, scene);
+    std::vector<uint8_t> before;
+    int changes = 0;
+    for (int64_t k = 0; k < 75; ++k) {
+      Shot a = shoot(&with, k);
+      const Shot b = shoot(&plain, k);
+      std::vector<uint8_t> text;
+      for (size_t i = 0; i < a.frame.size(); ++i) {
+        const size_t x = i / 3 % 160, y = i / 480;
+        if (a.frame[i] == b.frame[i]) continue;
+        EXPECT_TRUE(left ? x > 40 : x < 120) << x;
+        EXPECT_TRUE(top ? y > 90 : y < 30) << y;
+      }
+      for (size_t y = top ? 90 : 0; y < (top ? 120 : 30); ++y)
+        for (size_t x = 0; x < 160; ++x) {
+          const size_t i = 3 * (160 * y + x);
+          // White strokes: nothing else there is so bright in all channels.
+          text.push_back(a.frame[i] == 235 && a.frame[i + 1] == 235 && a.frame[i + 2] == 235 &&
+                         a.frame[i] != b.frame[i]);
+        }
+      EXPECT_LT(20, std::count(text.begin(), text.end(), 1));
+      changes += k > 0 && text != before;
+      before = text;
+      a.frame = b.frame;
+      EXPECT_TRUE(a == b) << k;
+    }
+    EXPECT_GE(changes, 2);
+    EXPECT_LE(changes, 8);  // noise may make the same level behind a stroke
+  }
+}
+
 }  // namespace
 }  // namespace qdmd::test

@@ -77,7 +77,8 @@ std::vector<Variant> variants() {
         {"vote, specks and holes", &DecisionSteps::vote},
         {"specks and holes", &DecisionSteps::specks},
         {"hard shadows", &DecisionSteps::hard},
-        {"flat things", &DecisionSteps::flat}};
+        {"flat things", &DecisionSteps::flat},
+        {"overlays", &DecisionSteps::overlays}};
     for (const auto& [step, member] : steps) {
       DecisionSteps without;
       without.*member = false;

@@ -42,8 +42,10 @@ for name in "${names[@]}"; do
   source="qdmdscenesrc scene=$name $effects seed=7 num-buffers=$(($(frame_of "$name") + 1))"
   caps="video/x-raw,width=320,height=240"
   # Every frame is written over the one before.
-  gst-launch-1.0 -q compositor name=side sink_1::xpos=320 sink_2::xpos=640 ! videoconvert ! \
-    videoscale method=lanczos ! video/x-raw,width=720,height=180,pixel-aspect-ratio=1/1 ! \
+  # The compositor would take the size of the result for its own, and cut off what is outside.
+  gst-launch-1.0 -q compositor name=side sink_1::xpos=320 sink_2::xpos=640 ! \
+    video/x-raw,width=960,height=240 ! videoconvert ! videoscale method=lanczos ! \
+    video/x-raw,width=720,height=180,pixel-aspect-ratio=1/1 ! \
     jpegenc quality=80 ! multifilesink location="docs/images/scenes/$name.jpg" \
     $source ! $caps ! side.sink_0 \
     $source truth=background ! $caps ! side.sink_1 \

@@ -9,8 +9,8 @@ namespace qdmd::scene {
 extern const EffectInfo kLowRate, kLength, kCamouflage, kStop, kAbandon, kRemove, kStand, kLeave,
     kClutter, kBootstrap, kFoliage, kLeaves, kTrees, kWater, kBoat, kFlicker, kShadow, kMirror,
     kMotionBlur, kRain, kSnow, kFog, kDefocus, kJitter, kFade, kLightSwitch, kLamp, kHeadlights,
-    kCloud, kNight, kBands, kExposure, kFocusSearch, kNoise, kInfrared, kCompression, kLostBlocks,
-    kSmear, kLostSignal, kFrozen;
+    kCloud, kNight, kBands, kExposure, kFocusSearch, kNoise, kInfrared, kClock, kCompression,
+    kLostBlocks, kSmear, kLostSignal, kFrozen;
 
 // For EffectInfo::make.
 template <typename Class>
