@@ -37,8 +37,7 @@ Overlays::Overlays(int width, int height, const DecisionConstants& constants)
       most_(constants.most_text) {
   const size_t blocks = static_cast<size_t>(cols_) * static_cast<size_t>(rows_);
   blocks_.resize(blocks);
-  for (auto& pixels : pixels_)
-    pixels.resize(static_cast<size_t>(tile_cols_) * static_cast<size_t>(tile_rows_));
+  pixels_.resize(size_t{kKept} * static_cast<size_t>(tile_cols_) * static_cast<size_t>(tile_rows_));
   found_.reserve(blocks);
   text_.reserve(blocks);
 }
@@ -51,7 +50,7 @@ uint64_t Overlays::bytes(int width, int height) {
 
 void Overlays::forget() {
   std::fill(blocks_.begin(), blocks_.end(), Block{});
-  for (auto& pixels : pixels_) std::fill(pixels.begin(), pixels.end(), 0u);
+  std::fill(pixels_.begin(), pixels_.end(), 0u);
   text_.clear();
 }
 
@@ -79,7 +78,7 @@ bool Overlays::changes(uint64_t before, uint64_t now) const {
 uint32_t Overlays::pixels_around(size_t block, int64_t frame) {
   const int col = static_cast<int>(block) % cols_ / kTile,
             row = static_cast<int>(block) / cols_ / kTile;
-  const std::vector<uint32_t>& pixels = pixels_of(frame);
+  const uint32_t* const pixels = pixels_of(frame);
   uint32_t sum = 0;
   for (int y = std::max(0, row - 1); y <= std::min(tile_rows_ - 1, row + 1); ++y)
     for (int x = std::max(0, col - 1); x <= std::min(tile_cols_ - 1, col + 1); ++x)
@@ -107,8 +106,8 @@ bool Overlays::changes_with_text(size_t block, int64_t frame) const {
 
 void Overlays::find_changes(const uint8_t* mask) {
   found_.clear();
-  std::vector<uint32_t>& pixels = pixels_of(frame_);
-  std::fill(pixels.begin(), pixels.end(), 0u);
+  uint32_t* const pixels = pixels_of(frame_);
+  std::fill_n(pixels, tiles(), 0u);
   for (int row = 0; row < rows_; ++row)
     for (int col = 0; col < cols_; ++col) {
       const auto block = static_cast<size_t>(row * cols_ + col);

@@ -3,7 +3,6 @@
 // they change.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -47,9 +46,10 @@ class Overlays {
   uint64_t read(const uint8_t* mask, int col, int row) const;
   bool changes(uint64_t before, uint64_t now) const;
   bool is_text(const Block& block) const { return block.said >= enough_; }
-  std::vector<uint32_t>& pixels_of(int64_t frame) {
-    return pixels_[static_cast<size_t>(frame & (kKept - 1))];
+  uint32_t* pixels_of(int64_t frame) {
+    return pixels_.data() + static_cast<size_t>(frame & (kKept - 1)) * tiles();
   }
+  size_t tiles() const { return pixels_.size() / kKept; }
   uint32_t pixels_around(size_t block, int64_t frame);
   bool is_alone(size_t block, int64_t frame, int64_t first, int64_t last);
   bool changes_with_text(size_t block, int64_t frame) const;
@@ -61,8 +61,7 @@ class Overlays {
   double share_, most_;
   int64_t frame_ = 0;
   std::vector<Block> blocks_;
-  // Pixels that changed in the newest frames, by tiles of some blocks.
-  std::array<std::vector<uint32_t>, kKept> pixels_;
+  std::vector<uint32_t> pixels_;  // that changed in the newest frames, by tiles of some blocks
   std::vector<uint32_t> found_,
       text_;  // blocks that changed much in a frame; and all that are text
 };

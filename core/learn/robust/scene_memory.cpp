@@ -334,7 +334,7 @@ void SceneMemory::hand_over(Proofs* solve) {
   for (size_t cell = 0; cell < marks_.size(); ++cell) {
     const int at = static_cast<int>(cell);
     const Of said = of(at);
-    marks_[cell] = said == Of::came || (said == Of::none && differs_[cell]);
+    marks_[cell] = said == Of::came || (said == Of::none && shown_.shows_other(cell));
     if (!marks_[cell] || !shown_.is_known(cell, looks_.newest() - looks_.since(at) + 1)) {
       marks_[cell] = 0;
       continue;

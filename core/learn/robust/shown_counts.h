@@ -17,17 +17,18 @@ class ShownCounts {
  public:
   ShownCounts() = default;
   // Takes all memory.
-  explicit ShownCounts(size_t cells) : shown_(cells), others_(cells) {
+  explicit ShownCounts(size_t cells) : shown_(cells), others_(cells), other_(cells) {
     for (std::vector<float>& levels : background_) levels.resize(cells);
   }
   static uint64_t bytes(uint64_t cells) {
-    return cells * (2 * sizeof(int) + kChannels * sizeof(float));
+    return cells * (2 * sizeof(int) + sizeof(uint8_t) + kChannels * sizeof(float));
   }
 
   void forget() {
     std::fill(shown_.begin(), shown_.end(), 0);
     std::fill(others_.begin(), others_.end(), 0);
-    grown_up_ = false;
+    std::fill(other_.begin(), other_.end(), uint8_t{0});
+    counts_ = grown_up_ = false;
   }
   // Somebody else has seen enough frames: the next background is known in all cells.
   void grow_up() { grown_up_ = true; }
@@ -42,19 +43,28 @@ class ShownCounts {
         background_[c][cell] = background[c][cell];
       }
       const int at = static_cast<int>(cell);
-      const bool shows = !differs[cell] && looks.shows_look(at);
+      const bool shows_look = looks.shows_look(at), shows = !differs[cell] && shows_look;
+      const bool same = !shows_look || differs[cell] == other_[cell];
       if (grown_up_) {
         shown_[cell] = static_cast<int>(steps::proofs::kYoungFrames);
-      } else if (moved >= StandingLooks::kSame) {
+      } else if (!counts_ || (moved >= StandingLooks::kSame && !same)) {
         shown_[cell] = shows ? looks.frames(at) : 0;
         others_[cell] = 0;
       } else {
         shown_[cell] += shows;
         others_[cell] += differs[cell];
+        // Who comes later and stands for long does not make it less known.
+        if (shows && shown_[cell] >= steps::proofs::kLasts && shown_[cell] >= 2 * others_[cell])
+          shown_[cell] = std::max(shown_[cell], static_cast<int>(steps::proofs::kYoungFrames));
       }
+      if (shows_look) other_[cell] = differs[cell];
     }
+    counts_ = true;
     grown_up_ = false;
   }
+  // True where the newest look that the cell showed is not the background's: also while somebody
+  // moves there, and it shows none.
+  bool shows_other(size_t cell) const { return other_[cell] != 0; }
   // Lorries may have hidden most of a street for the whole of a window: nothing is known of a place
   // until many frames have shown its background, or three seconds of frames which are most of those
   // before the look that is there now. now: for how many frames that look has been there.
@@ -66,6 +76,8 @@ class ShownCounts {
  private:
   std::array<std::vector<float>, kChannels> background_;
   std::vector<int> shown_, others_;
+  std::vector<uint8_t> other_;  // the newest look that it showed is not the background's
+  bool counts_ = false;         // a background is known
   bool grown_up_ = false;
 };
 
