@@ -60,9 +60,9 @@ struct DecisionConstants {
   float at_end = 253;
 
   // ---- Overlays ----
-  // Text changes alone so many times before it is known, and nothing near it changes for so many
-  // frames before and after. Of what is white this share changes, and at most this share of the
-  // picture's blocks do.
+  // Text changes at once so many times before it is known; half as many pixels near it, at most,
+  // change in each of so many frames before and after. Of what is white in a block this share
+  // changes at least, and at most this share of the picture's blocks do.
   double text_changes = 6, text_rests = 6, text_share = 0.3, most_text = 0.04;
 
   // ---- HardShadows ----

@@ -111,7 +111,7 @@ TEST(Overlays, WhoStandsIsNone) {
 }
 
 TEST(Overlays, KeyFramesOfACodecAreNone) {
-  // Each second what is white changes at once: a part of it, or all of the picture.
+  // Each half second what is white changes at once: a part of it, or all of the picture.
   for (const bool all : {false, true}) {
     const std::vector<double> found = kept(4000, [&](int t, Mask* mask) {
       const int turn = t / 12 % 2;

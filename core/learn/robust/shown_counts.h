@@ -17,7 +17,7 @@ class ShownCounts {
  public:
   ShownCounts() = default;
   // Takes all memory.
-  explicit ShownCounts(size_t cells) : shown_(cells), others_(cells), other_(cells) {
+  explicit ShownCounts(size_t cells) : shown_(cells), others_(cells), shows_other_(cells) {
     for (std::vector<float>& levels : background_) levels.resize(cells);
   }
   static uint64_t bytes(uint64_t cells) {
@@ -27,13 +27,14 @@ class ShownCounts {
   void forget() {
     std::fill(shown_.begin(), shown_.end(), 0);
     std::fill(others_.begin(), others_.end(), 0);
-    std::fill(other_.begin(), other_.end(), uint8_t{0});
+    std::fill(shows_other_.begin(), shows_other_.end(), uint8_t{0});
     counts_ = grown_up_ = false;
   }
   // Somebody else has seen enough frames: the next background is known in all cells.
   void grow_up() { grown_up_ = true; }
   // Counts the newest frame of `looks`. differs: by cells, as StandingLooks::find_differing.
-  // Another background begins with the frames of the look that it has.
+  // Another background, which a look came to show or no longer shows, begins with the frames of
+  // that look. Else it is the same one in another light.
   void count(const StandingLooks& looks, const std::vector<uint8_t>& differs,
              const float* const background[3]) {
     for (size_t cell = 0; cell < shown_.size(); ++cell) {
@@ -44,7 +45,7 @@ class ShownCounts {
       }
       const int at = static_cast<int>(cell);
       const bool shows_look = looks.shows_look(at), shows = !differs[cell] && shows_look;
-      const bool same = !shows_look || differs[cell] == other_[cell];
+      const bool same = !shows_look || differs[cell] == shows_other_[cell];
       if (grown_up_) {
         shown_[cell] = static_cast<int>(steps::proofs::kYoungFrames);
       } else if (!counts_ || (moved >= StandingLooks::kSame && !same)) {
@@ -57,14 +58,14 @@ class ShownCounts {
         if (shows && shown_[cell] >= steps::proofs::kLasts && shown_[cell] >= 2 * others_[cell])
           shown_[cell] = std::max(shown_[cell], static_cast<int>(steps::proofs::kYoungFrames));
       }
-      if (shows_look) other_[cell] = differs[cell];
+      if (shows_look) shows_other_[cell] = differs[cell];
     }
     counts_ = true;
     grown_up_ = false;
   }
   // True where the newest look that the cell showed is not the background's: also while somebody
   // moves there, and it shows none.
-  bool shows_other(size_t cell) const { return other_[cell] != 0; }
+  bool shows_other(size_t cell) const { return shows_other_[cell] != 0; }
   // Lorries may have hidden most of a street for the whole of a window: nothing is known of a place
   // until many frames have shown its background, or three seconds of frames which are most of those
   // before the look that is there now. now: for how many frames that look has been there.
@@ -76,8 +77,8 @@ class ShownCounts {
  private:
   std::array<std::vector<float>, kChannels> background_;
   std::vector<int> shown_, others_;
-  std::vector<uint8_t> other_;  // the newest look that it showed is not the background's
-  bool counts_ = false;         // a background is known
+  std::vector<uint8_t> shows_other_;  // the newest look that it showed is not the background's
+  bool counts_ = false;               // a background is known
   bool grown_up_ = false;
 };
 
