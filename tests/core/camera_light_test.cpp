@@ -340,10 +340,11 @@ const Camera kCameras[] = {
 
 // F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
 // picture.
-std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed) {
+std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed,
+                             const char* name = "basic", int frames = kFrames) {
   scene::SceneOptions how;
   how.width = kWidth, how.height = kHeight, how.frames_per_second = 25, how.seed = seed;
-  scene::Scene scene(how, "basic");
+  scene::Scene scene(how, name);
   Engine engine;
   EXPECT_TRUE(engine.configure(options, kWidth, kHeight).ok());
   Wishes wishes = first_wishes(options);
@@ -363,7 +364,7 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
       wrong += 50 * differ > kWidth * kHeight;
     }
   };
-  for (int t = 0; t < kFrames; ++t) {
+  for (int t = 0; t < frames; ++t) {
     scene.render(t, scene::kFrame | scene::kLabels);
     PackedPicture picture(kWidth, kHeight);
     std::vector<uint8_t> planes(3 * size_t{kWidth} * kHeight);
@@ -385,7 +386,7 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
   }
   EXPECT_TRUE(engine.drain().ok());
   take();
-  EXPECT_EQ(left, kFrames);
+  EXPECT_EQ(left, frames);
   return {2 * both / sum, wrong};
 }
 
@@ -410,6 +411,18 @@ TEST_P(CameraLight, MasksStayRight) {
       EXPECT_GE(f, 0.9) << camera.name << ", seed " << seed;
       EXPECT_LE(wrong, 10) << camera.name << ", seed " << seed;
     }
+}
+
+// Who stands there clips at times, too: it is the same look.
+TEST(ClippedStanders, LeaveNoGhost) {
+  for (const uint64_t seed : {4, 9}) {
+    EngineOptions options = robust_of(100);
+    options.mode = Mode::live;
+    const auto [f, wrong] = score(kCameras[1], options, seed, "stop", 700);
+    RecordProperty("seed " + std::to_string(seed), std::to_string(f));
+    EXPECT_GE(f, 0.85) << seed;
+    EXPECT_LE(wrong, 5) << seed;
+  }
 }
 
 // A window of 50 sees half of a swing.

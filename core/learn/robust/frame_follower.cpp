@@ -83,12 +83,16 @@ bool FrameFollower::is_calm() const {
 
 // The cells of a frame; where its light is another one, without what samples at the end of their
 // range hide.
-FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light) {
+FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light,
+                                                     const StandingLooks& looks) {
   const Cells shown(context_.room.frames->cells(), slot);
   if (!is_lit(light)) return shown;
   const Cells background = this->background();
   for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
-    const auto found = unclipped(shown.at(cell), background.at(cell), light);
+    const auto shows = shown.at(cell);
+    auto found = unclipped(shows, background.at(cell), light);
+    if (found == shows && looks.frames(static_cast<int>(cell)) > 0)
+      found = unclipped(shows, Cells(looks.levels(), 0).at(cell), light);
     for (size_t c = 0; c < kChannels; ++c)
       unclipped_.plane(0, static_cast<int>(c))[cell] = found[c];
   }

@@ -19,7 +19,7 @@ void FrameFollower::mend(const Learner::Compared& frame, BackgroundModel* model)
   if (frame.live) {
     look_ahead(frame, model);
   } else {
-    looks_.follow(unclipped_cells(frame.around.slot(frame.at), light), light, frame.number);
+    looks_.follow(unclipped_cells(frame.around.slot(frame.at), light, looks_), light, frame.number);
     // What was absorbed is background until it goes.
     if (absorbed_.any()) {
       std::vector<int> uncovered = looks_.uncovered(background);
@@ -42,7 +42,7 @@ void FrameFollower::look_ahead(const Learner::Compared& frame, BackgroundModel* 
   // What a camera showed while it looked for its exposure is no proof of anything.
   if (exposure_.follow(Cells(context_.room.frames->cells(), slot), context_.grid.cells()))
     memory_.forget();
-  memory_.follow(unclipped_cells(slot, light), light, frame.number);
+  memory_.follow(unclipped_cells(slot, light, memory_.looks()), light, frame.number);
   if (!model) return;
   follow_disturbances(Cells(context_.room.frames->cells(), slot), light, frame.number);
   if (disturbances_.goes_on()) return;
