@@ -27,9 +27,9 @@ void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
   weight_.resize(grid.cells());
   looked_.resize(grid.cells());
   for (size_t cell = 0; cell < grid.cells(); ++cell) {
-    const std::span<const uint16_t> frames = stable.of_cell[cell];
-    const bool confirmed = !frames.empty() && frames.back() == count;
-    const auto shown = static_cast<float>(frames.size() - (confirmed ? 1 : 0));
+    const size_t of_window = stable.of_cell.count_before(cell, count);
+    const bool confirmed = of_window < stable.of_cell.count(cell);
+    const auto shown = static_cast<float>(of_window);
     weight_[cell] = (confirmed ? weight_[cell] : 0) + fresh * shown;
     // What hides it for a while says nothing of how often it is seen.
     const bool hidden = !held.empty() && held[cell];

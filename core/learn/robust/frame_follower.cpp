@@ -89,10 +89,10 @@ FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light,
   if (!is_lit(light)) return shown;
   const Cells background = this->background();
   for (size_t cell = 0; cell < context_.grid.cells(); ++cell) {
-    const auto shows = shown.at(cell);
-    auto found = unclipped(shows, background.at(cell), light);
-    if (found == shows && looks.frames(static_cast<int>(cell)) > 0)
-      found = unclipped(shows, Cells(looks.levels(), 0).at(cell), light);
+    const auto shows = shown.at(cell), look = Cells(looks.levels(), 0).at(cell);
+    // Both may be hidden: it is what it was.
+    const bool goes_on = looks.frames(static_cast<int>(cell)) > 0 && may_show(shows, look, light);
+    const auto found = unclipped(shows, goes_on ? look : background.at(cell), light);
     for (size_t c = 0; c < kChannels; ++c)
       unclipped_.plane(0, static_cast<int>(c))[cell] = found[c];
   }

@@ -2,6 +2,7 @@
 // Which frames show a region's background: the start of robust Q-DMD.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -18,17 +19,29 @@ class FrameLists {
   FrameLists() = default;
   // Empty lists, for up to `most` frames each.
   FrameLists(size_t cells, int most)
-      : most_(static_cast<size_t>(most)), counts_(cells, 0), frames_(cells * most_) {}
+      : most_(static_cast<size_t>(most)),
+        counts_(cells, 0),
+        chosen_(cells, 0),
+        frames_(cells * most_) {}
   static uint64_t bytes(uint64_t cells, uint64_t most) {
-    return cells * (most + 1) * sizeof(uint16_t);
+    return cells * (most + 2) * sizeof(uint16_t);
   }
 
   size_t size() const { return counts_.size(); }
+  // Those that are chosen: all, or what choose() left; in time order.
   std::span<const uint16_t> operator[](size_t cell) const {
-    return {frames_.data() + cell * most_, counts_[cell]};
+    return {frames_.data() + cell * most_, chosen_[cell]};
   }
+  // How many there are, chosen or not, of the frames t < `end`.
+  size_t count_before(size_t cell, int end) const {
+    const uint16_t* const list = frames_.data() + cell * most_;
+    return static_cast<size_t>(
+        std::count_if(list, list + counts_[cell], [end](uint16_t t) { return t < end; }));
+  }
+  size_t count(size_t cell) const { return counts_[cell]; }
   void add(size_t cell, int frame) {
     frames_[cell * most_ + counts_[cell]++] = static_cast<uint16_t>(frame);
+    chosen_[cell] = counts_[cell];
   }
   // Makes it the list of frames t < `most` with shows(t).
   template <typename Shows>
@@ -40,12 +53,19 @@ class FrameLists {
       list[count] = static_cast<uint16_t>(t);
       count += shows(t) ? 1 : 0;
     }
-    counts_[cell] = static_cast<uint16_t>(count);
+    counts_[cell] = chosen_[cell] = static_cast<uint16_t>(count);
+  }
+  // Chooses those of the list with keeps(t).
+  template <typename Keeps>
+  void choose(size_t cell, Keeps keeps) {
+    uint16_t* const list = frames_.data() + cell * most_;
+    chosen_[cell] =
+        static_cast<uint16_t>(std::stable_partition(list, list + counts_[cell], keeps) - list);
   }
 
  private:
   size_t most_ = 0;
-  std::vector<uint16_t> counts_, frames_;
+  std::vector<uint16_t> counts_, chosen_, frames_;
 };
 
 // For each cell the frames that show its background, in time order, and the patches' distance from

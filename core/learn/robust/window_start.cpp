@@ -274,7 +274,7 @@ void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) 
   using steps::light::kAtEnd, steps::light::kNearEnd;
   const size_t cells = context_.grid.cells();
   std::vector<std::pair<float, uint16_t>> shown, darker;
-  std::vector<uint8_t> keeps(looks.pictures.size());
+  std::vector<uint8_t> keeps(looks.pictures.size()), shows;
   const auto level = [&](size_t frame, size_t cell) -> std::array<float, kChannels> {
     const float* const of = looks.cells[frame];
     return {of[cell], of[cells + cell], of[2 * cells + cell]};
@@ -326,7 +326,11 @@ void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) 
     const size_t darkest = most_darkest(shown.size());
     for (size_t i = 0; i < shown.size(); ++i)
       keeps[shown[i].second] = any ? shown[i].first < kNearEnd : i < darkest;
-    stable_.of_cell.take(cell, [&](size_t frame) { return frame < keeps.size() && keeps[frame]; });
+    // All of them have shown it.
+    shows = keeps;
+    for (const uint16_t frame : stable_.of_cell[cell]) shows[frame] = 1;
+    stable_.of_cell.take(cell, [&](size_t frame) { return frame < shows.size() && shows[frame]; });
+    stable_.of_cell.choose(cell, [&](size_t frame) { return keeps[frame] != 0; });
   }
 }
 
