@@ -54,6 +54,20 @@ struct PatchSum {
 
 // ---- Patches ----
 
+TEST(FrameLists, ChosenFramesAreOfThoseThatShowIt) {
+  FrameLists lists(2, 8);
+  lists.take(1, [](size_t t) { return t % 2 == 1 || t == 6; });
+  EXPECT_EQ(lists.count(1), 5u);
+  EXPECT_EQ(lists.count_before(1, 6), 3u);
+  lists.choose(1, [](size_t t) { return t == 3 || t == 7; });
+  const std::vector<uint16_t> chosen = {3, 7};
+  EXPECT_TRUE(std::ranges::equal(lists[1], chosen));
+  EXPECT_EQ(lists.count(1), 5u);
+  EXPECT_EQ(lists.count_before(1, 7), 4u);
+  EXPECT_TRUE(lists[0].empty());
+  EXPECT_EQ(lists.count(0), 0u);
+}
+
 TEST(Patches, LevelsHaveSixteenSteps) {
   for (int step = 0; step < 65536; ++step) {
     const float level = static_cast<float>(step) / kStepsPerLevel;

@@ -84,7 +84,7 @@ bool FrameFollower::is_calm() const {
 // The cells of a frame; where its light is another one, without what samples at the end of their
 // range hide.
 FrameFollower::Cells FrameFollower::unclipped_cells(int slot, const Gain& light,
-                                                     const StandingLooks& looks) {
+                                                    const StandingLooks& looks) {
   const Cells shown(context_.room.frames->cells(), slot);
   if (!is_lit(light)) return shown;
   const Cells background = this->background();
