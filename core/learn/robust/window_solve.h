@@ -86,7 +86,7 @@ class WindowSolve {
   bool leave_out_disturbed(const WindowLight& light, const GridFrames& median);
   GridPictures cells_of_shown() const;
   void carry_gains();
-  void take_unit_of(const GridFrames& earlier, GridFrames* here);
+  bool take_unit_of(const GridFrames& earlier, GridFrames* here);
   void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
   void prefer_darker(const Looks& looks, const GridPictures& chosen);
   void find_brightest();

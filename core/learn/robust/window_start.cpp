@@ -51,7 +51,7 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
     gains_[static_cast<size_t>(shown_[i])] = context_.of_format(light.gains[i]);
   carry_gains();
   clips_ = light.clips;
-  if (clips_ && known.earlier->known()) take_unit_of(known.earlier->cells(), &here);
+  if (known.earlier->known()) clips_ = take_unit_of(known.earlier->cells(), &here);
 
   const int of_window = std::min(shown, context_.parameters.start_frames);
   looks.count = of_window + old;
@@ -193,10 +193,13 @@ void WindowSolve::carry_gains() {
 
 // Where samples are at the end of their range, a darker picture of earlier windows knows more: unit
 // light becomes its light, and `here` is what it shows where these frames say only "at least".
-void WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
+// False where no samples are, neither while these frames' light changes nor beside that picture.
+bool WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
   const size_t cells = context_.grid.cells();
   LightScratch scratch(cells);
   const Gain gain = context_.of_format(light_over(earlier, 0, *here, 0, &scratch));
+  const Gain brighter = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
+  if (!clips_ && !at_end(*here, 0, brighter)) return false;
   const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
   for (size_t c = 0; c < kChannels; ++c) {
     const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
@@ -211,6 +214,7 @@ void WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
       if (at_end) levels[cell] = std::max(levels[cell], known[cell] * unit / gain[c]);
     }
   }
+  return true;
 }
 
 // The background picture of the stable frames, its thresholds, and the light of each frame.
