@@ -1,4 +1,3 @@
-#include <cstdlib>
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/learn/robust/frame_follower.h"
 
