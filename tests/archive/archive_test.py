@@ -39,7 +39,7 @@ WIDTH, HEIGHT, FRAMES, WINDOW = 162, 122, 90, 10
 
 def command(*words, ranks=0):
     words = [archive, *map(str, words)]
-    return [mpirun, '-q', '-n', str(ranks), *JOB, *words] if ranks else words
+    return [mpirun, '-n', str(ranks), *JOB, *words] if ranks else words
 
 
 def run(folder, *words, expect=0, ranks=0, env=None):
@@ -271,7 +271,7 @@ def rows_of_windows(folder):
     # One process's file is another: the job ends, and says why.
     make_clip(folder / 'short.mkv', 13, 33, 7)
     words = ['--by', 'rows', '--background', 'r.png', '--window', '10', '--method', 'qdmd']
-    done = subprocess.run([mpirun, '-q', *JOB, '-n', '1', archive, 'rows.mkv', *words, ':', '-n',
+    done = subprocess.run([mpirun, *JOB, '-n', '1', archive, 'rows.mkv', *words, ':', '-n',
                            '1', archive, 'short.mkv', *words], cwd=folder, capture_output=True,
                           text=True, timeout=60)
     assert done.returncode and 'do all machines have the same files' in done.stderr, done.stderr

@@ -35,7 +35,11 @@ def default_of(spec):
     if spec.value_type.name == 'GstValueArray':
         return 'empty'
     if spec.value_type.is_a(GObject.TYPE_ENUM):
-        return f'`{spec.default_value.value_nick}`'
+        value = spec.default_value
+        # Newer bindings have the number.
+        if not hasattr(value, 'value_nick'):
+            value = GObject.enum_get_value(spec.enum_class, value)
+        return f'`{value.value_nick}`'
     if spec.value_type.name == 'gboolean':
         return 'true' if spec.default_value else 'false'
     if spec.value_type.name == 'gchararray':
