@@ -70,8 +70,9 @@ void FrameFollower::follow_disturbances(const Cells& frame, const Gain& light, i
   std::array<float, kChannels> unit;
   for (size_t c = 0; c < kChannels; ++c) unit[c] = 1 / std::min(light[c], 1.0f);
   const auto apart = [&](size_t c, size_t cell) {
-    return unit[c] *
-           std::abs(frame.of[c][cell] - std::min(background.of[c][cell] * light[c], 255.0f));
+    const float level = frame.of[c][cell], known = background.of[c][cell],
+                expected = known * light[c];
+    return is_bound(level, expected, known, light[c]) ? 0 : unit[c] * std::abs(level - expected);
   };
   const float most = kChannels * steps::contours::kLooksDiffer;
   int differing = 0;

@@ -327,9 +327,14 @@ void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) 
       if (!darker.empty()) shown.swap(darker);
     }
     const bool any = shown.front().first < kNearEnd;
-    const size_t darkest = most_darkest(shown.size());
-    for (size_t i = 0; i < shown.size(); ++i)
-      keeps[shown[i].second] = any ? shown[i].first < kNearEnd : i < darkest;
+    if (!any) {
+      for (auto& [key, frame] : shown) key = luma_gain(looks.pictures[frame].gain);
+      std::sort(shown.begin(), shown.end());
+    }
+    // What is darker says more, if only by some percent.
+    const float most = any ? kNearEnd : shown.front().first * (1 + steps::light::kStill);
+    const size_t count = any ? shown.size() : most_darkest(shown.size());
+    for (size_t i = 0; i < count; ++i) keeps[shown[i].second] = shown[i].first < most;
     // All of them have shown it.
     shows = keeps;
     for (const uint16_t frame : stable_.of_cell[cell]) shows[frame] = 1;
