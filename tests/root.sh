@@ -80,5 +80,6 @@ cp /etc/resolv.conf "$root/etc/"
 exec unshare --mount --pid --fork --kill-child bash -c '
   mount --rbind /dev "$0/dev"
   mount -t proc proc "$0/proc"
+  mount -t sysfs -o ro sysfs "$0/sys"
   exec chroot "$0" env -i HOME=/root LANG=C.UTF-8 TERM="${TERM:-dumb}" DEBIAN_FRONTEND=noninteractive \
     PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin "$@"' "$root" "$@"

@@ -30,10 +30,11 @@ from gi.repository import GstApp, GstVideo  # noqa: F401  (methods of appsrc and
 
 archive, mpirun = (str(pathlib.Path(argument).resolve()) for argument in sys.argv[1:3])
 LONG = bool(os.environ.get('QDMD_ARCHIVE_LONG'))
-# One machine only: no launcher and no network.
-JOB = ['--oversubscribe', '--allow-run-as-root', '--bind-to', 'none', '--mca', 'plm', 'isolated',
-       '--mca', 'btl', 'self,vader', '--mca', 'oob_tcp_if_include', 'lo', '--mca',
-       'btl_vader_single_copy_mechanism', 'none', '--mca', 'mpi_yield_when_idle', '1']
+JOB = ['--oversubscribe', '--allow-run-as-root', '--bind-to', 'none']
+# One machine only: no launcher and no network. Open MPI 5 has no such options.
+if ') 4.' in subprocess.run([mpirun, '--version'], capture_output=True, text=True).stdout:
+    JOB += ['--mca', 'plm', 'isolated', '--mca', 'btl', 'self,vader', '--mca', 'oob_tcp_if_include', 'lo',
+            '--mca', 'btl_vader_single_copy_mechanism', 'none', '--mca', 'mpi_yield_when_idle', '1']
 WIDTH, HEIGHT, FRAMES, WINDOW = 162, 122, 90, 10
 
 

@@ -29,17 +29,23 @@ def number(value):
     return f'{value:g}' if isinstance(value, float) else str(value)
 
 
+def values_of(spec):
+    """{number: value} of an enum property."""
+    kind = spec.enum_class
+    if hasattr(kind, '__enum_values__'):
+        return kind.__enum_values__
+    # Newer bindings have GLib's class.
+    values = {number: GObject.enum_get_value(kind, number) for number in range(kind.minimum, kind.maximum + 1)}
+    return {number: value for number, value in values.items() if value}
+
+
 def default_of(spec):
     if not spec.flags & GObject.ParamFlags.WRITABLE:
         return ''
     if spec.value_type.name == 'GstValueArray':
         return 'empty'
     if spec.value_type.is_a(GObject.TYPE_ENUM):
-        value = spec.default_value
-        # Newer bindings have the number.
-        if not hasattr(value, 'value_nick'):
-            value = GObject.enum_get_value(spec.enum_class, value)
-        return f'`{value.value_nick}`'
+        return f'`{values_of(spec)[int(spec.default_value)].value_nick}`'
     if spec.value_type.name == 'gboolean':
         return 'true' if spec.default_value else 'false'
     if spec.value_type.name == 'gchararray':
@@ -92,7 +98,7 @@ def print_properties(own):
         if not spec.value_type.is_a(GObject.TYPE_ENUM):
             continue
         print(f'Values of `{spec.name}`:\n\n| value | number | meaning |\n|---|---|---|')
-        for value, entry in sorted(spec.enum_class.__enum_values__.items()):
+        for value, entry in sorted(values_of(spec).items()):
             print(f'| `{entry.value_nick}` | {value} | {cell(entry.value_name)} |')
         print()
 
