@@ -425,6 +425,17 @@ TEST(ClippedStanders, AreNoBackground) {
   }
 }
 
+// In infra-red the places are those that were known in colour: who comes and stands soon after the
+// switch is told from what was there.
+TEST(InfraRed, StandersAreNoBackground) {
+  const Camera camera = {
+      "infrared",
+      [](int t, size_t, float sample, float luma) { return t < 300 ? sample : 1.15f * luma; }, 400};
+  const auto [f, wrong] = score(camera, robust_of(100), 9, "stop", 550);
+  EXPECT_GE(f, 0.84);
+  EXPECT_LE(wrong, 5);
+}
+
 // A window of 50 sees half of a swing: where it only sees the bright one, the darker pictures
 // before say what is behind.
 TEST(ShortWindows, APartOfASwingIsEnough) {

@@ -59,10 +59,9 @@ void FrameFollower::publish(bool whole) {
   published_ = 1 - published_;
   light_.forget();
   if (!std::exchange(scene_begins_, false)) return;
-  colours_begin_ = false;
   looks_.forget();
-  if (context_.room.models != Models::two_of_live) memory_.forget();
-  other_scene_ = false;
+  if (context_.room.models != Models::two_of_live) forget_places();
+  colours_begin_ = other_scene_ = false;
 }
 
 // What the newest solve found is what the one in use has.
@@ -148,7 +147,13 @@ void FrameFollower::begin_scene() {
   calm_ = 0;
   scene_begins_ = true;
   // Where frames wait, they show the scene before until publish().
-  if (context_.room.models == Models::two_of_live) memory_.forget();
+  if (context_.room.models == Models::two_of_live) forget_places();
+}
+
+// In other colours the places are the same, and their background is known.
+void FrameFollower::forget_places() {
+  memory_.forget();
+  if (colours_begin_) memory_.grow_up();
 }
 
 void FrameFollower::write(std::vector<LearntPlace>* places) const {

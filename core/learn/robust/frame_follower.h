@@ -90,6 +90,7 @@ class FrameFollower {
   Cells background() const { return {background_cells_, published_}; }
   Cells unclipped_cells(int slot, const Gain& light, const StandingLooks& looks);
   bool is_calm() const;
+  void forget_places();
   void follow_disturbances(const Cells& frame, const Gain& light, int64_t number);
   void note_uncovered(const std::vector<int>& cells, const StandingLooks& looks, int64_t number);
   SceneSeen colours_of(const Cells& frame);
