@@ -86,7 +86,9 @@ class WindowSolve {
   bool leave_out_disturbed(const WindowLight& light, const GridFrames& median);
   GridPictures cells_of_shown() const;
   void carry_gains();
-  bool take_unit_of(const GridFrames& earlier, GridFrames* here);
+  Gain light_of_earlier(const EarlierWindow& earlier, const GridFrames& here) const;
+  bool has_ends(const EarlierWindow& earlier, const Gain& of_earlier, const GridFrames& here) const;
+  void take_unit_of(const GridFrames& earlier, const Gain& gain, GridFrames* here);
   void unclip(const float* shown, const GridFrames& median, const Gain& gain, float* out) const;
   void prefer_darker(const Looks& looks, const GridPictures& chosen);
   void find_brightest();

@@ -51,7 +51,15 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
     gains_[static_cast<size_t>(shown_[i])] = context_.of_format(light.gains[i]);
   carry_gains();
   clips_ = light.clips;
-  if (known.earlier->known()) clips_ = take_unit_of(known.earlier->cells(), &here);
+  Gain of_earlier = kSameLight;
+  if (known.earlier->known()) {
+    of_earlier = light_of_earlier(*known.earlier, here);
+    clips_ = clips_ || has_ends(*known.earlier, of_earlier, here);
+    if (clips_) {
+      take_unit_of(known.earlier->cells(), of_earlier, &here);
+      of_earlier = light_of_earlier(*known.earlier, here);
+    }
+  }
 
   const int of_window = std::min(shown, context_.parameters.start_frames);
   looks.count = of_window + old;
@@ -84,11 +92,8 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
     looks.snapshots.push_back(t);
   }
   if (!known.earlier->known()) return looks;
-  LightScratch scratch(cells);
-  const GridFrames& earlier = known.earlier->cells();
-  looks.pictures.push_back(
-      known.earlier->picture(context_.of_format(light_over(earlier, 0, here, 0, &scratch))));
-  looks.cells.push_back(earlier.plane(0, 0));
+  looks.pictures.push_back(known.earlier->picture(of_earlier));
+  looks.cells.push_back(known.earlier->cells().plane(0, 0));
   looks.recollection = known.earlier->recollection(context_.parameters.earlier_share *
                                                    static_cast<float>(looks.count));
   looks.recollection.older_frames = of_window > 0 ? old : 0;
@@ -191,15 +196,25 @@ void WindowSolve::carry_gains() {
   }
 }
 
-// Where samples are at the end of their range, a darker picture of earlier windows knows more: unit
-// light becomes its light, and `here` is what it shows where these frames say only "at least".
-// False where no samples are, neither while these frames' light changes nor beside that picture.
-bool WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
+// The gain of the earlier picture over these frames' median.
+Gain WindowSolve::light_of_earlier(const EarlierWindow& earlier, const GridFrames& here) const {
+  LightScratch scratch(context_.grid.cells());
+  return context_.of_format(light_over(earlier.cells(), 0, here, 0, &scratch));
+}
+
+// True where the brighter one of the earlier picture and these frames' median has samples at the
+// end of their range.
+bool WindowSolve::has_ends(const EarlierWindow& earlier, const Gain& of_earlier,
+                           const GridFrames& here) const {
+  const Gain brighter = {1 / of_earlier[0], 1 / of_earlier[1], 1 / of_earlier[2]};
+  return at_end(here, 0, brighter) || at_end(earlier.cells(), 0, of_earlier);
+}
+
+// A darker picture of earlier windows knows more than samples at the end of their range: unit light
+// becomes its light, and `here` is what it shows where these frames say only "at least". gain: its
+// light, over `here`.
+void WindowSolve::take_unit_of(const GridFrames& earlier, const Gain& gain, GridFrames* here) {
   const size_t cells = context_.grid.cells();
-  LightScratch scratch(cells);
-  const Gain gain = context_.of_format(light_over(earlier, 0, *here, 0, &scratch));
-  const Gain brighter = {1 / gain[0], 1 / gain[1], 1 / gain[2]};
-  if (!clips_ && !at_end(*here, 0, brighter)) return false;
   const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
   for (size_t c = 0; c < kChannels; ++c) {
     const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
@@ -214,7 +229,6 @@ bool WindowSolve::take_unit_of(const GridFrames& earlier, GridFrames* here) {
       if (at_end) levels[cell] = std::max(levels[cell], known[cell] * unit / gain[c]);
     }
   }
-  return true;
 }
 
 // The background picture of the stable frames, its thresholds, and the light of each frame.
