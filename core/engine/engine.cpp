@@ -37,10 +37,13 @@ Status Engine::configure(const EngineOptions& options, int width, int height) tr
   }
   pace_.begin(front_of_efforts(learner->sample_steps()),
               live ? plan_.live().hop_size() : options.window_size);
+  DecisionSteps steps = at_rate(options.steps, options.frame_rate);
+  // There the edge is looked for in pixels that a thing covers in part.
+  if (size.is_reduced()) steps.edges = false;
   background_ = std::make_unique<Background>(
       std::move(learner),
       LearnerRoom{&frames_, options.window_size, plan_.models(), &workers_->pool(), &clock_},
-      options.colours, at_rate(options.steps, options.frame_rate), options.levels);
+      options.colours, steps, options.levels);
   if (options.stabilize != Stabilize::off) {
     stabilizer_ =
         std::make_unique<Stabilizer>(options.stabilize, options.colours, small_width, small_height);

@@ -248,18 +248,13 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     in_rows([&](int first, int size) { learn(first, size); });
     noise_.end_frame(mask);
   }
-  // Where a shadow was is no place to learn noise from. Much noise hides texture.
+  // Where a shadow or an edge was is no place to learn noise from. Much noise hides texture, and
+  // what an edge shows.
   if (steps_.hard && !now_.means && knows_light() && !much_moves()) leave_hard_shadows();
+  if (steps_.edges && !now_.means && !frame.fixed) leave_edges();
   if (steps_.overlays && !frame.fixed) overlays_.take_out(mask);
   find_colour();
   ++frames_;
-}
-
-// share: of the picture.
-void Decision::take_out_specks(uint8_t colour, double share) {
-  if (!steps_.specks || shape_.reach == 0) return;
-  const double least = share * static_cast<double>(shape_.pixels());
-  specks_.take_out(of_.mask.data(), colour, static_cast<size_t>(least), colour == 255);
 }
 
 void Decision::find_colour() {
@@ -514,25 +509,8 @@ bool Decision::knows_light() const {
   return !grey_ && !now_.below && now_.frame.shadows != Shadows::foreground;
 }
 
-// Before a camera that shakes, what is seen is the background beside its place: it has the
-// background's texture, in any light.
-bool Decision::much_moves() const {
-  const auto cells = static_cast<size_t>(texture_.grid().rows * texture_.grid().cols);
-  size_t moving = 0;
-  for (size_t cell = 0; cell < cells; ++cell) moving += moves(cell);
-  return static_cast<double>(moving) > constants().hard.most_moving * static_cast<double>(cells);
-}
-
 void Decision::keep_flat_things() {
-  FlatThings::Planes planes;
-  for (int c = 0; c < kChannels; ++c) {
-    planes.x[c] = now_.frame.x[c].high;
-    planes.l[c] = level_row(c, 0);
-  }
-  planes.differing = differing_row(0);
-  planes.x_stride = static_cast<size_t>(shape_.width);
-  planes.l_stride = shape_.stride;
-  flat_.keep(planes, foreground_row(0));
+  flat_.keep({planes(), differing_row(0)}, foreground_row(0));
   if (!steps_.light || !knows_light()) return;
   flat_.visit_areas([&](const Rectangle& area) {
     for (int y = area.y; y < area.y + area.height; ++y) {
@@ -541,21 +519,6 @@ void Decision::keep_flat_things() {
       leave_shadows(run);
     }
   });
-}
-
-void Decision::leave_hard_shadows() {
-  HardShadows::Planes planes;
-  for (int c = 0; c < kChannels; ++c) {
-    planes.x[c] = now_.frame.x[c].high;
-    planes.l[c] = level_row(c, 0);
-  }
-  planes.x_stride = static_cast<size_t>(shape_.width);
-  planes.l_stride = shape_.stride;
-  const bool marked = now_.frame.shadows == Shadows::marked;
-  const bool any =
-      hard_.take_out(planes, rgb_, black_, of_.mask.data(), marked ? of_.shaded.data() : nullptr);
-  // Outlines of shadows are left.
-  if (any) take_out_specks(255, constants().least_foreground);
 }
 
 void Decision::leave_shadows(const Run& run) {

@@ -13,6 +13,7 @@
 #include "core/base/ignored_areas.h"
 #include "core/base/large_vector.h"
 #include "core/base/levels.h"
+#include "core/foreground/compared_planes.h"
 #include "core/foreground/decision_steps.h"
 #include "core/foreground/flat_things.h"
 #include "core/foreground/hard_shadows.h"
@@ -59,6 +60,7 @@ struct Comparison {
 //     foreground, too,
 //   - it belongs to a part that is too small; holes that are too small are foreground (Specks),
 //   - it belongs to a region in much less light (HardShadows; as find_shaded),
+//   - it is at the mask's edge, and shows less than half of what is there (fit_edges),
 //   - it is text that a recorder draws (Overlays).
 // In much noise, means of 3 x 3 pixels are compared. Of samples of more than 8 bits a pixel's own
 // distance from L is that of whole samples; means, what is around, and light are compared in the
@@ -160,9 +162,11 @@ class Decision {
   void look_around(Run* run);
   bool knows_light() const;
   bool much_moves() const;
+  ComparedPlanes planes() const;
   void keep_flat_things();
   void leave_shadows(const Run& run);
   void leave_hard_shadows();
+  void leave_edges();
   void learn(int first_row, int row_count);
   // Samples in the margins.
   void repeat_border(uint8_t* row) const;

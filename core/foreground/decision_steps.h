@@ -3,6 +3,7 @@
 // docs/notebook/masks.md has what each step is worth, and what other constants would give.
 #pragma once
 
+#include "core/foreground/edges.h"
 #include "core/foreground/hard_shadows.h"
 #include "core/passes/shading.h"
 
@@ -68,6 +69,9 @@ struct DecisionConstants {
   // ---- HardShadows ----
   HardShadowConstants hard;
 
+  // ---- Edges ----
+  EdgeConstants edges;
+
   // ---- Specks ----
   // Parts of the mask below these shares of the picture are specks, and holes.
   double least_foreground = 1 / 4000.0, least_hole = 1 / 500.0;
@@ -82,6 +86,7 @@ struct DecisionSteps {
   bool specks = true;  // Specks; only after a vote
   bool hard = true;    // HardShadows
   bool flat = true;    // FlatThings; only with textures
+  bool edges = true;   // fit_edges
   bool overlays = true;
   DecisionConstants constants = {};
 };

@@ -9,6 +9,7 @@
 
 #include "core/base/colours.h"
 #include "core/base/ignored_areas.h"
+#include "core/foreground/compared_planes.h"
 #include "core/foreground/decision_steps.h"
 
 namespace qdmd {
@@ -21,11 +22,9 @@ namespace qdmd {
 // range, which say nothing.
 class FlatThings {
  public:
-  // A frame's planes and L, whose rows begin x_stride and l_stride samples apart, and a mask of
-  // what differs, whose rows are as far apart as L's.
-  struct Planes {
-    const uint8_t *x[3], *l[3], *differing;
-    size_t x_stride, l_stride;
+  // And a mask of what differs, whose rows are as far apart as L's.
+  struct Planes : ComparedPlanes {
+    const uint8_t* differing;
   };
 
   // Takes all memory. Blocks have 4 x 4 samples, `step` pixels apart.

@@ -109,8 +109,8 @@ std::array<int, 3> HardShadows::quarters_of(const std::array<int, 3>& sum, int c
 }
 
 // The mean of those of four pixels that are in the mask, of two at least.
-void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
-                             const uint8_t* mask, int col, int row) {
+void HardShadows::read_block(const ComparedPlanes& planes, const RgbColours& rgb,
+                             const uint8_t black[3], const uint8_t* mask, int col, int row) {
   const auto left = static_cast<size_t>(col * side_), top = static_cast<size_t>(row * side_);
   const size_t right =
                    std::min(left + static_cast<size_t>(side_ / 2), static_cast<size_t>(width_ - 1)),
@@ -149,8 +149,8 @@ void HardShadows::read_block(const Planes& planes, const RgbColours& rgb, const 
 }
 
 // False where no block is in the mask.
-bool HardShadows::read_blocks(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
-                              const uint8_t* mask) {
+bool HardShadows::read_blocks(const ComparedPlanes& planes, const RgbColours& rgb,
+                              const uint8_t black[3], const uint8_t* mask) {
   for (const uint32_t block : white_) flags_[block] = 0;
   white_.clear();
   for (int row = 0; row < rows_; ++row) {
@@ -372,8 +372,8 @@ bool HardShadows::clear_shadow(size_t block, uint8_t* mask, uint8_t* marks) cons
   return any;
 }
 
-bool HardShadows::take_out(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
-                           uint8_t* mask, uint8_t* marks) {
+bool HardShadows::take_out(const ComparedPlanes& planes, const RgbColours& rgb,
+                           const uint8_t black[3], uint8_t* mask, uint8_t* marks) {
   if (!read_blocks(planes, rgb, black, mask)) return false;
   find_regions();
   if (!find_judged()) return false;

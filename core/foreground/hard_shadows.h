@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/foreground/compared_planes.h"
 #include "core/passes/rgb_colours.h"
 
 namespace qdmd {
@@ -52,12 +53,6 @@ struct HardShadowConstants {
 // sun: what all regions of the same ratio of light say together, in many frames, says enough.
 class HardShadows {
  public:
-  // A frame's planes and L: rows begin x_stride and l_stride samples apart.
-  struct Planes {
-    const uint8_t *x[3], *l[3];
-    size_t x_stride, l_stride;
-  };
-
   // Takes all memory. Blocks have 2 * step pixels on a side.
   HardShadows(int width, int height, int step, const HardShadowConstants& constants = {});
   static uint64_t bytes(int width, int height, int step);
@@ -71,8 +66,8 @@ class HardShadows {
 
   // Takes shadows out of `mask` (255 or 0, in row order): sets what is taken in `marks`, or null.
   // rgb and black: of the planes' samples, as for find_shaded(). True where something was taken.
-  bool take_out(const Planes& planes, const RgbColours& rgb, const uint8_t black[3], uint8_t* mask,
-                uint8_t* marks);
+  bool take_out(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
+                uint8_t* mask, uint8_t* marks);
 
  private:
   struct Block {
@@ -88,11 +83,11 @@ class HardShadows {
   size_t index(int col, int row) const {
     return static_cast<size_t>(row) * static_cast<size_t>(cols_) + static_cast<size_t>(col);
   }
-  bool read_blocks(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+  bool read_blocks(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
                    const uint8_t* mask);
   std::array<int, 3> quarters_of(const std::array<int, 3>& sum, int count, const RgbColours& rgb,
                                  const uint8_t black[3]) const;
-  void read_block(const Planes& planes, const RgbColours& rgb, const uint8_t black[3],
+  void read_block(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
                   const uint8_t* mask, int col, int row);
   void join(size_t a, size_t b);
   void find_regions();

@@ -228,17 +228,19 @@ void add_regions(const std::string& name, const Size& size) {
 void add_all(const Size& size) {
   add_decision("all", size, {});
   const std::pair<const char*, bool DecisionSteps::*> steps[] = {
-      {"noise", &DecisionSteps::noise},   {"texture", &DecisionSteps::texture},
-      {"light", &DecisionSteps::light},   {"vote", &DecisionSteps::vote},
-      {"specks", &DecisionSteps::specks}, {"hard", &DecisionSteps::hard},
-      {"flat", &DecisionSteps::flat},     {"overlays", &DecisionSteps::overlays},
+      {"noise", &DecisionSteps::noise},       {"texture", &DecisionSteps::texture},
+      {"light", &DecisionSteps::light},       {"vote", &DecisionSteps::vote},
+      {"specks", &DecisionSteps::specks},     {"hard", &DecisionSteps::hard},
+      {"flat", &DecisionSteps::flat},         {"edges", &DecisionSteps::edges},
+      {"overlays", &DecisionSteps::overlays},
   };
   for (const auto& [name, step] : steps) {
     DecisionSteps without;
     without.*step = false;
     add_decision(std::string("without_") + name, size, without);
   }
-  add_decision("alone", size, {false, false, false, false, false, false, false, false});
+  add_decision("alone", size,
+               {false, false, false, false, false, false, false, false, false, false});
   const auto half = std::make_shared<IgnoredAreas>();
   half->add({0, 0, size.width, size.height / 2});
   add_decision("half_ignored", size, {}, false, half);

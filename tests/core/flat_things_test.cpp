@@ -37,7 +37,7 @@ double found_in(int step, const Paint& paint) {
       for (auto& plane : frame.level) plane[p] = wave;
     }
     if (t == 40) paint(place, &frame);
-    FlatThings::Planes planes;
+    FlatThings::Planes planes = {};
     for (int c = 0; c < 3; ++c)
       planes.x[c] = frame.level[c].data(), planes.l[c] = level.level[c].data();
     planes.differing = differing.data();

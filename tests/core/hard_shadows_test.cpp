@@ -19,8 +19,8 @@ namespace {
 
 constexpr uint8_t kNoBlack[3] = {0, 0, 0};
 
-HardShadows::Planes planes_of(const Floor& frame, const Floor& level) {
-  HardShadows::Planes planes;
+ComparedPlanes planes_of(const Floor& frame, const Floor& level) {
+  ComparedPlanes planes;
   for (int c = 0; c < 3; ++c)
     planes.x[c] = frame.level[c].data(), planes.l[c] = level.level[c].data();
   planes.x_stride = planes.l_stride = static_cast<size_t>(frame.width);

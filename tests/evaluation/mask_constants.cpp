@@ -76,6 +76,8 @@ std::vector<Constant> constants() {
       {"light.around", of_light(&LightRange::around)},
       {"light.least_rest", of_light(&LightRange::least_rest)},
       {"light.of_level", of_light(&LightRange::of_level)},
+      {"edges.half", [](DecisionConstants& all, double factor) { all.edges.half *= factor; }},
+      {"edges.rest", [](DecisionConstants& all, double factor) { all.edges.rest *= factor; }},
       {"hard.dark", of_hard(&Hard::dark)},
       {"hard.step", of_hard(&Hard::step)},
       {"hard.noise", of_hard(&Hard::noise)},

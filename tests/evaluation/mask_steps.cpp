@@ -57,6 +57,11 @@ void run_engine(const LabelledClip& clip, Mode mode, const DecisionSteps& steps,
   take();
 }
 
+// No step but the first.
+DecisionSteps alone() {
+  return {false, false, false, false, false, false, false, false, false, false};
+}
+
 std::vector<Variant> variants() {
   std::vector<Variant> all;
   const auto add = [&](const std::string& name, Mode mode, const DecisionSteps& steps,
@@ -65,7 +70,6 @@ std::vector<Variant> variants() {
                      run_engine(clip, mode, steps, shadows, see);
                    }});
   };
-  const DecisionSteps alone = {false, false, false, false, false, false, false, false};
   for (auto [name, mode] : {std::pair{"default", Mode::batch}, {"mode=live", Mode::live}}) {
     const std::string of = name;
     add(of, mode, {}, Shadows::background);
@@ -78,6 +82,7 @@ std::vector<Variant> variants() {
         {"specks and holes", &DecisionSteps::specks},
         {"hard shadows", &DecisionSteps::hard},
         {"flat things", &DecisionSteps::flat},
+        {"edges", &DecisionSteps::edges},
         {"overlays", &DecisionSteps::overlays}};
     for (const auto& [step, member] : steps) {
       DecisionSteps without;
@@ -85,7 +90,7 @@ std::vector<Variant> variants() {
       add(of + " without " + step, mode, without, Shadows::background);
     }
     add(of + ", shadows=foreground", mode, {}, Shadows::foreground);
-    add(of + ", each pixel by itself", mode, alone, Shadows::foreground);
+    add(of + ", each pixel by itself", mode, alone(), Shadows::foreground);
   }
   const auto peer = [&](const std::string& name, auto make) {
     for (bool smooth : {false, true})
@@ -120,9 +125,8 @@ double score(const LabelledClip& clip, const Variant& variant) {
 void write_sheet(const LabelledClip& clip, const std::vector<size_t>& shown,
                  const std::string& file) {
   std::vector<std::vector<cv::Mat>> columns(2);
-  const DecisionSteps alone = {false, false, false, false, false, false, false, false};
   for (size_t i = 0; i < 2; ++i)
-    run_engine(clip, Mode::batch, i == 0 ? alone : DecisionSteps(),
+    run_engine(clip, Mode::batch, i == 0 ? alone() : DecisionSteps(),
                i == 0 ? Shadows::foreground : Shadows::background,
                [&](const cv::Mat& mask) { columns[i].push_back(mask.clone()); });
   std::vector<cv::Mat> rows;
