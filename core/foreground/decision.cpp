@@ -249,9 +249,9 @@ void Decision::decide(const Comparison& frame, Pool* pool) {
     noise_.end_frame(mask);
   }
   // Where a shadow or an edge was is no place to learn noise from. Much noise hides texture, and
-  // what an edge shows.
+  // what an edge shows. In grey, no colour tells another part of a thing from less of it.
   if (steps_.hard && !now_.means && knows_light() && !much_moves()) leave_hard_shadows();
-  if (steps_.edges && !now_.means && !frame.fixed) leave_edges();
+  if (steps_.edges && !now_.means && !grey_ && !frame.fixed) leave_edges();
   if (steps_.overlays && !frame.fixed) overlays_.take_out(mask);
   find_colour();
   ++frames_;

@@ -60,7 +60,8 @@ struct Comparison {
 //     foreground, too,
 //   - it belongs to a part that is too small; holes that are too small are foreground (Specks),
 //   - it belongs to a region in much less light (HardShadows; as find_shaded),
-//   - it is at the mask's edge, and shows less than half of what is there (fit_edges),
+//   - it is at the mask's edge, and shows less than half of what is there (fit_edges; not in grey
+//     pictures),
 //   - it is text that a recorder draws (Overlays).
 // In much noise, means of 3 x 3 pixels are compared. Of samples of more than 8 bits a pixel's own
 // distance from L is that of whole samples; means, what is around, and light are compared in the

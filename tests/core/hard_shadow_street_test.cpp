@@ -171,11 +171,13 @@ TEST(HardShadows, AreMarkedOrForegroundIfOneWishes) {
     EXPECT_GT(marked.people.white, 0.96);
     EXPECT_LT(marked.people.grey, 0.03);
     const Taken all = taken_in(street, format, Shadows::foreground);
-    EXPECT_GT(all.shadow.white, 0.7);
+    // The soft edge of a shadow shows less than half of it.
+    EXPECT_GT(all.shadow.white, 0.55);
     EXPECT_GT(all.people.white, 0.96);
     EXPECT_EQ(all.shadow.grey + all.people.grey, 0);
-    // What is taken is marked. The vote has taken the rest, at the soft edges.
-    EXPECT_NEAR(marked.shadow.white + marked.shadow.grey, all.shadow.white, 0.05);
+    // What is taken is marked, with the soft edges, which are no edges of a mask then.
+    EXPECT_GE(marked.shadow.white + marked.shadow.grey, all.shadow.white);
+    EXPECT_NEAR(marked.shadow.white + marked.shadow.grey, all.shadow.white, 0.15);
   }
 }
 

@@ -115,6 +115,33 @@ TEST(LightOf, WhatMovesIsNoLight) {
   for (const Gain& gain : light_of(pan, 40).gains) EXPECT_FALSE(is_lit(gain));
 }
 
+// Leaves that are darker than what is behind hide most of it: from frame to frame, too little stays
+// to say what a frame's light is.
+TEST(LightOf, LeavesAreNoLight) {
+  const Grid grid = grid_of(24, 32);
+  for (uint32_t seed = 1; seed <= 6; ++seed) {
+    std::mt19937 rng(seed);
+    std::normal_distribution<float> noise(0, 0.5f);
+    std::uniform_real_distribution<float> share(0, 1);
+    const GridFrames background = random_frames(grid, 1, 80, 120, rng);
+    constexpr int kCount = 120;
+    GridFrames frames(grid, kCount);
+    for (int t = 0; t < kCount; ++t) {
+      // For a third of the time they hide nearly all.
+      const float hidden = t / 8 % 3 == 0 ? 0.9f : 0.3f;
+      for (size_t i = 0; i < grid.cells(); ++i) {
+        const bool hides = share(rng) < hidden;
+        const float level = 25 + 30 * share(rng);
+        for (int c = 0; c < kChannels; ++c)
+          frames.plane(t, c)[i] =
+              (hides ? level * (c == 1 ? 1.2f : 0.8f) : background.plane(0, c)[i]) + noise(rng);
+      }
+    }
+    for (const Gain& gain : light_of(frames, kCount).gains)
+      for (float of_channel : gain) EXPECT_NEAR(of_channel, 1, 0.03) << "seed " << seed;
+  }
+}
+
 TEST(LightOf, NothingToSeeIsTheSameLight) {
   const Grid grid = grid_of(4, 4);
   for (float level : {0.0f, 5.0f, 255.0f})

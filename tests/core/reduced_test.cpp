@@ -278,6 +278,8 @@ EngineOptions options_of(const Kind& kind, int scale) {
   options.method = kind.method;
   options.window_size = 16;
   options.mask_scale = scale;
+  // Pictures that are reduced have other edges.
+  options.steps.edges = false;
   return options;
 }
 

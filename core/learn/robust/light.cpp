@@ -238,11 +238,14 @@ class FramesOfLight {
   }
 
   // What changes from each frame to the next, added up: most of a picture is the same in both,
-  // people included, even where no two frames far apart share much of the background.
+  // people included, even where no two frames far apart share much of the background. Leaves that
+  // move before most of it share a ratio that says nothing.
   std::vector<Gain> followed() {
     std::vector<Gain> steps(count_, kSameLight);
     for_each(count_ - 1, [&](size_t t, size_t worker) {
-      steps[t + 1] = shared_gain(planes(t + 1).of, planes(t).of, cells(), &scratch_[worker]);
+      const Gain step = shared_gain(planes(t + 1).of, planes(t).of, cells(), &scratch_[worker]);
+      if (agreement(planes(t + 1).of, planes(t).of, cells(), step) > kLeastFollowed)
+        steps[t + 1] = step;
     });
     std::vector<Gain> gains(count_, kSameLight);
     for (size_t t = 1; t < count_; ++t)
@@ -252,15 +255,17 @@ class FramesOfLight {
   }
 
   // The gain of each frame over their common background, once `gains` are about right: where that
-  // makes fewer of its cells agree, its gain stays.
+  // makes fewer of its cells agree, its gain stays. A light that is far from it must explain as
+  // much more as gain_over() asks.
   void sharpen(std::vector<Gain>* gains) {
     const CellPlanes reference(median(*gains), 0);
     for_each(count_, [&](size_t t, size_t worker) {
       Gain& gain = (*gains)[t];
       const Gain sharper = shared_gain(planes(t).of, reference.of, cells(), &scratch_[worker]);
-      if (agreement(planes(t).of, reference.of, cells(), sharper) >
-          agreement(planes(t).of, reference.of, cells(), gain))
-        gain = sharper;
+      const float before = agreement(planes(t).of, reference.of, cells(), gain),
+                  after = agreement(planes(t).of, reference.of, cells(), sharper);
+      const bool is_far = change(sharper, gain) > std::log(kSwings);
+      if (after > (is_far ? kGrowth * before + kShare : before)) gain = sharper;
     });
   }
 
