@@ -510,7 +510,7 @@ bool Decision::knows_light() const {
 }
 
 void Decision::keep_flat_things() {
-  flat_.keep({planes(), differing_row(0)}, foreground_row(0));
+  flat_.keep({planes(), differing_row(0)}, now_.pool, foreground_row(0));
   if (!steps_.light || !knows_light()) return;
   flat_.visit_areas([&](const Rectangle& area) {
     for (int y = area.y; y < area.y + area.height; ++y) {

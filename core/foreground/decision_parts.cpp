@@ -38,8 +38,8 @@ bool Decision::much_moves() const {
 
 void Decision::leave_hard_shadows() {
   const bool marked = now_.frame.shadows == Shadows::marked;
-  const bool any =
-      hard_.take_out(planes(), rgb_, black_, of_.mask.data(), marked ? of_.shaded.data() : nullptr);
+  const bool any = hard_.take_out(planes(), rgb_, black_, now_.pool, of_.mask.data(),
+                                  marked ? of_.shaded.data() : nullptr);
   // Outlines of shadows are left.
   if (any) take_out_specks(255, constants().least_foreground);
 }

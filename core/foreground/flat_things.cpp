@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "core/foreground/mask_runs.h"
 #include "core/foreground/parts.h"
+#include "core/passes/bands.h"
 
 namespace qdmd {
 namespace {
@@ -36,12 +38,14 @@ FlatThings::FlatThings(int width, int height, int step, Colours colours,
   size_.resize(blocks);
   flat_at_.resize(blocks);
   flat_.reserve(blocks);
+  in_rows_ = RowLists<Flat>(static_cast<size_t>(rows_), static_cast<size_t>(cols_));
 }
 
 uint64_t FlatThings::bytes(int width, int height, int step) {
-  const auto blocks = static_cast<uint64_t>(width / (kAlong * step)) *
-                      static_cast<uint64_t>(height / (kAlong * step));
-  return blocks * (sizeof(float) + sizeof(uint8_t) + 3 * sizeof(uint32_t) + sizeof(Flat));
+  const auto cols = static_cast<uint64_t>(width / (kAlong * step)),
+             rows = static_cast<uint64_t>(height / (kAlong * step));
+  return cols * rows * (sizeof(float) + sizeof(uint8_t) + 3 * sizeof(uint32_t) + sizeof(Flat)) +
+         RowLists<Flat>::bytes(rows, cols);
 }
 
 void FlatThings::forget() {
@@ -68,20 +72,25 @@ bool FlatThings::differs(const Planes& planes, int col, int row) const {
 
 FlatThings::Look FlatThings::look_at(const uint8_t* const planes[3], size_t first,
                                      size_t stride) const {
-  Look look = {};
-  int above[kAlong] = {};
+  // Sums of a block, 24 differences at most, have room in 16 bits.
+  int16_t samples[kSamples];
   for (int i = 0; i < kAlong; ++i) {
-    int before = 0;
-    for (int j = 0; j < kAlong; ++j) {
-      const int sample = bright(
-          planes, first + static_cast<size_t>(i * step_) * stride + static_cast<size_t>(j * step_));
-      look.bright += sample;
-      if (j > 0) look.contrast += std::abs(sample - before);
-      if (i > 0) look.contrast += std::abs(sample - above[j]);
-      above[j] = before = sample;
-    }
+    const size_t row = first + static_cast<size_t>(i * step_) * stride;
+    for (int j = 0; j < kAlong; ++j)
+      samples[kAlong * i + j] =
+          static_cast<int16_t>(bright(planes, row + static_cast<size_t>(j * step_)));
   }
-  return look;
+  const auto apart = [&](int a, int b) {
+    return static_cast<int16_t>(std::abs(samples[a] - samples[b]));
+  };
+  int16_t sum = 0, contrast = 0;
+  for (int i = 0; i < kSamples; ++i) sum = static_cast<int16_t>(sum + samples[i]);
+  for (int i = kAlong; i < kSamples; ++i)
+    contrast = static_cast<int16_t>(contrast + apart(i, i - kAlong));
+  for (int i = 0; i < kAlong; ++i)
+    for (int j = 1; j < kAlong; ++j)
+      contrast = static_cast<int16_t>(contrast + apart(kAlong * i + j, kAlong * i + j - 1));
+  return {contrast, sum};
 }
 
 bool FlatThings::is_flat(const Look& look, const Look& level, size_t block) const {
@@ -104,25 +113,36 @@ void FlatThings::learn(size_t block, int contrast) {
   contrast_[block] = known + (static_cast<float>(contrast) - known) / static_cast<float>(looks);
 }
 
-void FlatThings::find_flat(const Planes& planes) {
+void FlatThings::find_flat(const Planes& planes, Pool* pool) {
   for (const Flat& flat : flat_) flat_at_[flat.block] = 0;
-  flat_.clear();
-  for (int row = 0; row < rows_; ++row) {
-    const bool learns = (row + frames_) % kTurns == 0;
-    for (int col = 0; col < cols_; ++col) {
-      const bool all = differs(planes, col, row);
-      if (!all && !learns) continue;
-      const auto block = static_cast<size_t>(row * cols_ + col);
-      const Look look = look_at(planes.x, first(col, row, planes.x_stride), planes.x_stride);
-      const Look level =
-          all ? look_at(planes.l, first(col, row, planes.l_stride), planes.l_stride) : Look{};
-      if (all && is_flat(look, level, block)) {
-        flat_.push_back({static_cast<uint32_t>(block), look.bright});
-        flat_at_[block] = static_cast<uint32_t>(flat_.size());
-      } else if (learns) {
-        learn(block, look.contrast);
-      }
-    }
+  const size_t pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
+  for_rows(pool, rows_, pixels, [&](int first, int size) {
+    for (int row = first; row < first + size; ++row) find_flat_in(planes, row);
+  });
+  in_rows_.collect(&flat_);
+  for (size_t flat = 0; flat < flat_.size(); ++flat)
+    flat_at_[flat_[flat].block] = static_cast<uint32_t>(flat) + 1;
+}
+
+void FlatThings::find_flat_in(const Planes& planes, int row) {
+  const auto of_row = static_cast<size_t>(row);
+  in_rows_.clear(of_row);
+  const bool learns = (row + frames_) % kTurns == 0;
+  const uint8_t* const differing = planes.differing + first(0, row, planes.l_stride);
+  for (int col = 0; col < cols_; ++col) {
+    // Where nothing differs, nothing is flat.
+    if (!learns) col = next_of(differing, col * side_, cols_ * side_, 255) / side_;
+    if (col == cols_) return;
+    const bool all = differs(planes, col, row);
+    if (!all && !learns) continue;
+    const auto block = static_cast<size_t>(row * cols_ + col);
+    const Look look = look_at(planes.x, first(col, row, planes.x_stride), planes.x_stride);
+    const Look level =
+        all ? look_at(planes.l, first(col, row, planes.l_stride), planes.l_stride) : Look{};
+    if (all && is_flat(look, level, block))
+      in_rows_.add(of_row, {static_cast<uint32_t>(block), look.bright});
+    else if (learns)
+      learn(block, look.contrast);
   }
 }
 
@@ -167,8 +187,8 @@ void FlatThings::paint(const Planes& planes, const Flat& flat, uint8_t* foregrou
     }
 }
 
-void FlatThings::keep(const Planes& planes, uint8_t* foreground) {
-  find_flat(planes);
+void FlatThings::keep(const Planes& planes, Pool* pool, uint8_t* foreground) {
+  find_flat(planes, pool);
   find_things();
   ++frames_;
   for (size_t flat = 0; flat < flat_.size(); ++flat)

@@ -11,6 +11,8 @@
 #include "core/base/ignored_areas.h"
 #include "core/foreground/compared_planes.h"
 #include "core/foreground/decision_steps.h"
+#include "core/foreground/row_lists.h"
+#include "core/parallel/pool.h"
 
 namespace qdmd {
 
@@ -34,7 +36,8 @@ class FlatThings {
 
   void forget();
   // Sets things to 255 in `foreground`, whose rows are as far apart as L's. Learns from each frame.
-  void keep(const Planes& planes, uint8_t* foreground);
+  // pool: may be null.
+  void keep(const Planes& planes, Pool* pool, uint8_t* foreground);
   // Visits the areas where that may have been. They overlap.
   template <typename Visit>
   void visit_areas(const Visit& visit) const {
@@ -59,7 +62,8 @@ class FlatThings {
   bool is_flat(const Look& look, const Look& level, size_t block) const;
   bool is_thing(size_t flat) const;
   void learn(size_t block, int contrast);
-  void find_flat(const Planes& planes);
+  void find_flat(const Planes& planes, Pool* pool);
+  void find_flat_in(const Planes& planes, int row);
   void find_things();
   Rectangle around(const Flat& flat) const;
   void paint(const Planes& planes, const Flat& flat, uint8_t* foreground) const;
@@ -75,6 +79,7 @@ class FlatThings {
   std::vector<uint32_t> part_, size_;  // another flat one of its part (parts.h), and all of these
   std::vector<uint32_t> flat_at_;      // by block: 1 + which of flat_, or 0
   std::vector<Flat> flat_;
+  RowLists<Flat> in_rows_;
 };
 
 }  // namespace qdmd

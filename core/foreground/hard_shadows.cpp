@@ -6,12 +6,13 @@
 
 #include "core/foreground/mask_runs.h"
 #include "core/foreground/parts.h"
+#include "core/passes/bands.h"
 
 namespace qdmd {
 namespace {
 
-// Of a block: bits of clipped channels are the lowest three.
-constexpr uint8_t kWhite = 8, kDark = 16;
+// Of a block: bits of clipped channels are the lowest three. Its region may be a shadow.
+constexpr uint8_t kWhite = 8, kDark = 16, kJudged = 32;
 // Logs are whole numbers, so that sums do not depend on their order. Levels have quarters. What is
 // added to a level keeps noise near black small.
 constexpr double kLogs = 4096, kAdded = 2;
@@ -71,6 +72,7 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
   }
   flags_.resize(blocks);
   white_.reserve(blocks);
+  in_rows_ = RowLists<uint32_t>(static_cast<size_t>(rows_), static_cast<size_t>(cols_));
   blocks_.resize(blocks);
   part_.resize(blocks);
   named_.resize(blocks);
@@ -79,8 +81,10 @@ HardShadows::HardShadows(int width, int height, int step, const HardShadowConsta
 }
 
 uint64_t HardShadows::bytes(int width, int height, int step) {
-  const uint64_t blocks = uint64_t(along(width, step)) * uint64_t(along(height, step));
-  return blocks * (sizeof(uint8_t) + sizeof(Block) + 2 * sizeof(uint32_t) + sizeof(uint16_t)) +
+  const uint64_t cols = uint64_t(along(width, step)), rows = uint64_t(along(height, step)),
+                 blocks = cols * rows;
+  return RowLists<uint32_t>::bytes(rows, cols) +
+         blocks * (sizeof(uint8_t) + sizeof(Block) + 2 * sizeof(uint32_t) + sizeof(uint16_t)) +
          std::min<uint64_t>(kMostRegions, blocks) * sizeof(Region) + 2 * kRatios * sizeof(float) +
          2 * kLevels * sizeof(int16_t);
 }
@@ -145,30 +149,37 @@ void HardShadows::read_block(const ComparedPlanes& planes, const RgbColours& rgb
   }
   if (sum < -3 * dark_ && brightest < hardly_dark_) flags |= kDark;
   flags_[here] = flags;
-  white_.push_back(static_cast<uint32_t>(here));
+  in_rows_.add(static_cast<size_t>(row), static_cast<uint32_t>(here));
 }
 
 // False where no block is in the mask.
 bool HardShadows::read_blocks(const ComparedPlanes& planes, const RgbColours& rgb,
-                              const uint8_t black[3], const uint8_t* mask) {
+                              const uint8_t black[3], Pool* pool, const uint8_t* mask) {
   for (const uint32_t block : white_) flags_[block] = 0;
-  white_.clear();
-  for (int row = 0; row < rows_; ++row) {
-    const int top = row * side_, middle = std::min(top + side_ / 2, height_ - 1);
-    const uint8_t* const first = mask + static_cast<size_t>(top) * static_cast<size_t>(width_);
-    const uint8_t* const second = mask + static_cast<size_t>(middle) * static_cast<size_t>(width_);
-    int a = next_of(first, 0, width_, 255), b = next_of(second, 0, width_, 255);
-    while (std::min(a, b) < width_) {
-      const int col = std::min(a, b) / side_, next = std::min((col + 1) * side_, width_);
-      read_block(planes, rgb, black, mask, col, row);
-      const auto go_on = [&](const uint8_t* in, int from) {
-        if (from >= next) return from;
-        return next < width_ && in[next] != 0 ? next : next_of(in, next, width_, 255);
-      };
-      a = go_on(first, a), b = go_on(second, b);
-    }
-  }
+  const size_t pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
+  for_rows(pool, rows_, pixels, [&](int first, int size) {
+    for (int row = first; row < first + size; ++row) read_row(planes, rgb, black, mask, row);
+  });
+  in_rows_.collect(&white_);
   return !white_.empty();
+}
+
+void HardShadows::read_row(const ComparedPlanes& planes, const RgbColours& rgb,
+                           const uint8_t black[3], const uint8_t* mask, int row) {
+  in_rows_.clear(static_cast<size_t>(row));
+  const int top = row * side_, middle = std::min(top + side_ / 2, height_ - 1);
+  const uint8_t* const first = mask + static_cast<size_t>(top) * static_cast<size_t>(width_);
+  const uint8_t* const second = mask + static_cast<size_t>(middle) * static_cast<size_t>(width_);
+  int a = next_of(first, 0, width_, 255), b = next_of(second, 0, width_, 255);
+  while (std::min(a, b) < width_) {
+    const int col = std::min(a, b) / side_, next = std::min((col + 1) * side_, width_);
+    read_block(planes, rgb, black, mask, col, row);
+    const auto go_on = [&](const uint8_t* in, int from) {
+      if (from >= next) return from;
+      return next < width_ && in[next] != 0 ? next : next_of(in, next, width_, 255);
+    };
+    a = go_on(first, a), b = go_on(second, b);
+  }
 }
 
 void HardShadows::join(size_t a, size_t b) {
@@ -219,27 +230,23 @@ void HardShadows::find_regions() {
 // blocks of other regions, and of none, count, too.
 void HardShadows::add_pairs(size_t here) {
   const int col = static_cast<int>(here) % cols_, row = static_cast<int>(here) / cols_;
-  const auto judged = [this](size_t block) -> Region* {
-    if (flags_[block] == 0 || named_[block] == kNoRegion) return nullptr;
-    Region& region = regions_[named_[block]];
-    return region.judged ? &region : nullptr;
+  const auto judged = [this](size_t block) {
+    return (flags_[block] & kJudged) != 0 ? &regions_[named_[block]] : nullptr;
   };
-  Region* const own = judged(here);
   for (int i = 0; i < 2 * kFar; ++i) {
     const int right = i < kFar ? i + 1 : 0, down = i < kFar ? 0 : i - kFar + 1;
     if (col + right >= cols_ || row + down >= rows_) continue;
     const size_t there = index(col + right, row + down);
-    if (flags_[there] == 0) continue;
-    Region* const other = judged(there);
-    if (!own && !other) continue;
+    const auto either = static_cast<uint8_t>(flags_[here] | flags_[there]);
+    if (flags_[there] == 0 || (either & kJudged) == 0) continue;
     int64_t both = 0, light = 0, level = 0, pairs = 0;
     for (size_t c = 0; c < 3; ++c) {
-      if (((flags_[here] | flags_[there]) >> c & 1) != 0) continue;
+      if ((either >> c & 1) != 0) continue;
       const int dx = std::clamp(blocks_[there].x[c] - blocks_[here].x[c], -edge_, edge_),
                 dl = std::clamp(blocks_[there].l[c] - blocks_[here].l[c], -edge_, edge_);
       both += dx * dl, light += dx * dx, level += dl * dl, ++pairs;
     }
-    for (Region* region : {own, other}) {
+    for (Region* region : {judged(here), judged(there)}) {
       if (!region) continue;
       region->both += both, region->light += light, region->level += level;
       region->pairs += pairs;
@@ -255,6 +262,8 @@ bool HardShadows::is_large(const Region& region) const {
 bool HardShadows::find_judged() {
   bool any = false;
   for (Region& region : regions_) any |= region.judged = is_large(region) && is_lit(region);
+  for (const uint32_t block : white_)
+    if (named_[block] != kNoRegion && regions_[named_[block]].judged) flags_[block] |= kJudged;
   return any;
 }
 
@@ -373,8 +382,8 @@ bool HardShadows::clear_shadow(size_t block, uint8_t* mask, uint8_t* marks) cons
 }
 
 bool HardShadows::take_out(const ComparedPlanes& planes, const RgbColours& rgb,
-                           const uint8_t black[3], uint8_t* mask, uint8_t* marks) {
-  if (!read_blocks(planes, rgb, black, mask)) return false;
+                           const uint8_t black[3], Pool* pool, uint8_t* mask, uint8_t* marks) {
+  if (!read_blocks(planes, rgb, black, pool, mask)) return false;
   find_regions();
   if (!find_judged()) return false;
   for (const uint32_t block : white_) add_pairs(block);

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/foreground/compared_planes.h"
+#include "core/foreground/row_lists.h"
+#include "core/parallel/pool.h"
 #include "core/passes/rgb_colours.h"
 
 namespace qdmd {
@@ -65,9 +67,10 @@ class HardShadows {
   void forget();
 
   // Takes shadows out of `mask` (255 or 0, in row order): sets what is taken in `marks`, or null.
-  // rgb and black: of the planes' samples, as for find_shaded(). True where something was taken.
+  // rgb and black: of the planes' samples, as for find_shaded(). pool: may be null. True where
+  // something was taken.
   bool take_out(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
-                uint8_t* mask, uint8_t* marks);
+                Pool* pool, uint8_t* mask, uint8_t* marks);
 
  private:
   struct Block {
@@ -84,7 +87,9 @@ class HardShadows {
     return static_cast<size_t>(row) * static_cast<size_t>(cols_) + static_cast<size_t>(col);
   }
   bool read_blocks(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
-                   const uint8_t* mask);
+                   Pool* pool, const uint8_t* mask);
+  void read_row(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
+                const uint8_t* mask, int row);
   std::array<int, 3> quarters_of(const std::array<int, 3>& sum, int count, const RgbColours& rgb,
                                  const uint8_t black[3]) const;
   void read_block(const ComparedPlanes& planes, const RgbColours& rgb, const uint8_t black[3],
@@ -110,6 +115,7 @@ class HardShadows {
   int clipped_;                        // quarters of a level
   std::vector<uint8_t> flags_;         // by block
   std::vector<uint32_t> white_;        // blocks in the mask, in order: few of all
+  RowLists<uint32_t> in_rows_;         // the same
   std::vector<Block> blocks_;
   std::vector<uint32_t> part_;   // another block of its region (parts.h)
   std::vector<uint16_t> named_;  // the region

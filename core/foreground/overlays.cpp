@@ -54,6 +54,7 @@ void Overlays::forget() {
   text_.clear();
 }
 
+// A bit for each white sample of a block: bit i of byte j is that of row i and column j.
 uint64_t Overlays::read(const uint8_t* mask, int col, int row) const {
   const int x = col * kSide, y = row * kSide;
   const int wide = std::min(kSide, width_ - x), tall = std::min(kSide, height_ - y);
@@ -62,9 +63,11 @@ uint64_t Overlays::read(const uint8_t* mask, int col, int row) const {
   uint64_t found = 0;
   for (int i = 0; i < tall; ++i, at += width_) {
     uint64_t samples = 0;
-    std::memcpy(&samples, at, static_cast<size_t>(wide));
-    // Each sample's highest bit, side by side.
-    found |= ((samples & 0x8080808080808080u) * 0x0002040810204081u >> 56) << (kSide * i);
+    if (wide == kSide)
+      std::memcpy(&samples, at, sizeof samples);
+    else
+      std::memcpy(&samples, at, static_cast<size_t>(wide));
+    found |= samples & uint64_t{0x0101010101010101} << i;
   }
   return found;
 }

@@ -11,7 +11,7 @@ namespace {
 
 // How long threads look for work before they sleep: several times what it takes to wake one, and
 // as long as the work of one thread between two passes of a frame.
-constexpr std::chrono::microseconds kLook{50};
+constexpr std::chrono::microseconds kLook{100};
 // Looks between two glances at the clock.
 constexpr int kGlance = 32;
 

@@ -43,7 +43,7 @@ double found_in(int step, const Paint& paint) {
     planes.differing = differing.data();
     planes.x_stride = planes.l_stride = static_cast<size_t>(width);
     foreground.assign(level.pixels(), 0);
-    things.keep(planes, foreground.data());
+    things.keep(planes, nullptr, foreground.data());
     if (t < 40) {
       EXPECT_EQ(std::count(foreground.begin(), foreground.end(), 255), 0);
     }

@@ -285,7 +285,7 @@ TEST(HardShadows, AreThoseOfASlowReference) {
       frame = with_noise(frame, 2, rng);
       const std::vector<uint8_t> expected = slow.take_out(frame, level, mask);
       std::vector<uint8_t> found = mask, marks(mask.size());
-      fast.take_out(planes_of(frame, level), {}, kNoBlack, found.data(), marks.data());
+      fast.take_out(planes_of(frame, level), {}, kNoBlack, nullptr, found.data(), marks.data());
       ASSERT_EQ(found, expected) << width << " x " << height << ", frame " << t;
       for (size_t p = 0; p < mask.size(); ++p) ASSERT_EQ(mask[p], found[p] | marks[p]);
       white += static_cast<size_t>(std::count(mask.begin(), mask.end(), 255));
@@ -310,7 +310,7 @@ double taken_of(const Floor& level, const Paint& paint) {
     paint(Rectangle{10 + 4 * t, 20, 24, 50}, &frame, &mask);
     frame = with_noise(frame, 2, rng);
     std::vector<uint8_t> left = mask;
-    shadows.take_out(planes_of(frame, level), {}, kNoBlack, left.data(), nullptr);
+    shadows.take_out(planes_of(frame, level), {}, kNoBlack, nullptr, left.data(), nullptr);
     share = 1 - static_cast<double>(std::count(left.begin(), left.end(), 255)) /
                     static_cast<double>(std::count(mask.begin(), mask.end(), 255));
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/learn/robust/in_blocks.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/standing_looks.h"
 
@@ -37,29 +38,16 @@ class ShownCounts {
   // that look. Else it is the same one in another light.
   void count(const StandingLooks& looks, const std::vector<uint8_t>& differs,
              const float* const background[3]) {
-    for (size_t cell = 0; cell < shown_.size(); ++cell) {
-      float moved = 0;
+    in_blocks(shown_.size(), [&](size_t first, size_t size) {
+      float moved[kTogether] = {};
       for (size_t c = 0; c < kChannels; ++c) {
-        moved += std::abs(background[c][cell] - background_[c][cell]);
-        background_[c][cell] = background[c][cell];
+        const float* const now = background[c] + first;
+        float* const before = background_[c].data() + first;
+        for (size_t i = 0; i < size; ++i) moved[i] += std::abs(now[i] - before[i]);
+        std::copy_n(now, size, before);
       }
-      const int at = static_cast<int>(cell);
-      const bool shows_look = looks.shows_look(at), shows = !differs[cell] && shows_look;
-      const bool same = !shows_look || differs[cell] == shows_other_[cell];
-      if (grown_up_) {
-        shown_[cell] = static_cast<int>(steps::proofs::kYoungFrames);
-      } else if (!counts_ || (moved >= StandingLooks::kSame && !same)) {
-        shown_[cell] = shows ? looks.frames(at) : 0;
-        others_[cell] = 0;
-      } else {
-        shown_[cell] += shows;
-        others_[cell] += differs[cell];
-        // Who comes later and stands for long does not make it less known.
-        if (shows && shown_[cell] >= steps::proofs::kLasts && shown_[cell] >= 2 * others_[cell])
-          shown_[cell] = std::max(shown_[cell], static_cast<int>(steps::proofs::kYoungFrames));
-      }
-      if (shows_look) shows_other_[cell] = differs[cell];
-    }
+      for (size_t i = 0; i < size; ++i) count(looks, differs, first + i, moved[i]);
+    });
     counts_ = true;
     grown_up_ = false;
   }
@@ -75,6 +63,27 @@ class ShownCounts {
   }
 
  private:
+  // moved: how far the cell's background is from the one before, sum of the channels.
+  void count(const StandingLooks& looks, const std::vector<uint8_t>& differs, size_t cell,
+             float moved) {
+    const int at = static_cast<int>(cell);
+    const bool shows_look = looks.shows_look(at), shows = !differs[cell] && shows_look;
+    const bool same = !shows_look || differs[cell] == shows_other_[cell];
+    if (grown_up_) {
+      shown_[cell] = static_cast<int>(steps::proofs::kYoungFrames);
+    } else if (!counts_ || (moved >= StandingLooks::kSame && !same)) {
+      shown_[cell] = shows ? looks.frames(at) : 0;
+      others_[cell] = 0;
+    } else {
+      shown_[cell] += shows;
+      others_[cell] += differs[cell];
+      // Who comes later and stands for long does not make it less known.
+      if (shows && shown_[cell] >= steps::proofs::kLasts && shown_[cell] >= 2 * others_[cell])
+        shown_[cell] = std::max(shown_[cell], static_cast<int>(steps::proofs::kYoungFrames));
+    }
+    if (shows_look) shows_other_[cell] = differs[cell];
+  }
+
   std::array<std::vector<float>, kChannels> background_;
   std::vector<int> shown_, others_;
   std::vector<uint8_t> shows_other_;  // the newest look that it showed is not the background's

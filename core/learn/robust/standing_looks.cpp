@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/learn/robust/in_blocks.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/learn/robust/places.h"
 
@@ -14,8 +15,6 @@ namespace {
 using namespace steps::looks;
 constexpr int kLook = 0, kNext = 1, kBefore = 2;
 constexpr int kPassedInFiles = 128;  // frames
-// Cells that are followed together: plain loops, which the compiler makes vectors of.
-constexpr size_t kTogether = 64;
 
 // The planes of cell `first` and of those after it.
 struct Planes {
@@ -34,15 +33,6 @@ inline int compare(const Planes& a, const Planes& b, size_t count, float* __rest
   int others = 0;
   for (size_t i = 0; i < count; ++i) others += apart[i] < same ? 0 : 1;
   return others;
-}
-
-// Calls work(first, count) for blocks of cells; for most of them `count` is a constant, which
-// compilers make better loops of.
-template <typename Work>
-void in_blocks(size_t cells, const Work& work) {
-  size_t first = 0;
-  for (; first + kTogether <= cells; first += kTogether) work(first, kTogether);
-  if (first < cells) work(first, cells - first);
 }
 
 }  // namespace
