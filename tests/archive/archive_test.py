@@ -246,10 +246,12 @@ def frames_are_found_again(folder):
         assert len(whole) == frames, f'{recording}: {len(whole)} frames'
         run(folder, *recording, *words, '--stretch', 3 * WINDOW, '--part', '2/3')
         plan = json.loads((folder / 'found.mkv.progress' / 'plan.json').read_text())
-        assert by_time is None or plan['by-time'] == by_time, recording
+        assert by_time is None or plan['by-time'] == by_time, f'{recording}: {plan}'
         for part in (1, 3):
             run(folder, *recording, *words, '--stretch', 3 * WINDOW, '--part', f'{part}/3')
-        assert video(folder / 'found.mkv') == whole, recording
+        found = video(folder / 'found.mkv')
+        others = [t for t, (a, b) in enumerate(zip(found, whole)) if a != b]
+        assert found == whole, f'{recording}: {len(found)} frames, others from {others[:3]} on'
 
 
 def rows_of_windows(folder):
@@ -269,12 +271,13 @@ def rows_of_windows(folder):
     assert 'method=qdmd and dmd' in text, text
     text = run(folder, 'rows.mkv', '--by', 'rows', '--mask', 'r.mkv', expect=2)
     assert '--background x.png alone' in text, text
-    # One process's file is another: the job ends, and says why.
+    # One process's file is another: the job ends, and says why. (Open MPI 5.0.7 crashes with two
+    # commands, so that a shell chooses.)
     make_clip(folder / 'short.mkv', 13, 33, 7)
+    choice = 'f=rows.mkv; [ "$OMPI_COMM_WORLD_RANK" = 0 ] || f=short.mkv; exec "$0" "$f" "$@"'
     words = ['--by', 'rows', '--background', 'r.png', '--window', '10', '--method', 'qdmd']
-    done = subprocess.run([mpirun, *JOB, '-n', '1', archive, 'rows.mkv', *words, ':', '-n',
-                           '1', archive, 'short.mkv', *words], cwd=folder, capture_output=True,
-                          text=True, timeout=60)
+    done = subprocess.run([mpirun, '-n', '2', *JOB, 'sh', '-c', choice, archive, *words],
+                          cwd=folder, capture_output=True, text=True, timeout=60)
     assert done.returncode and 'do all machines have the same files' in done.stderr, done.stderr
 
 

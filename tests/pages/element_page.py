@@ -13,6 +13,8 @@ from gi.repository import GObject, Gst
 
 ELEMENTS = ['qdmdbackground', 'qdmdseparate', 'qdmdscenesrc']
 # Elements that have another one's properties and signals, but for some.
+# The page is the same with each version of GStreamer that the project builds with.
+OF_NEWER_BASE_CLASSES = ('automatic-eos',)
 LIKE = {'qdmdseparate': ('qdmdbackground', ['output'])}
 PLAIN_NAMES = {'gboolean': 'boolean', 'guint': 'uint', 'gint': 'int', 'guint64': 'uint64',
                'gdouble': 'double', 'gchararray': 'string', 'GstStructure': 'structure',
@@ -146,7 +148,8 @@ def print_element(name):
     kind = factory.get_element_type()
     properties = GObject.list_properties(kind)
     own = [spec for spec in properties if spec.owner_type == kind]
-    inherited = [spec.name for spec in properties if spec.owner_type != kind]
+    inherited = [spec.name for spec in properties
+                 if spec.owner_type != kind and spec.name not in OF_NEWER_BASE_CLASSES]
     print(f'## {name}\n')
     print(f'{factory.get_metadata("description")}.\n')
     print(f'Klass `{factory.get_metadata("klass")}`, rank {factory.get_rank()}, '

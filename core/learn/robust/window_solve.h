@@ -11,6 +11,7 @@
 #include "core/learn/robust/earlier_window.h"
 #include "core/learn/robust/frame_memory.h"
 #include "core/learn/robust/light.h"
+#include "core/learn/robust/light_curve.h"
 #include "core/learn/robust/median_picture.h"
 #include "core/learn/robust/solve_history.h"
 #include "core/learn/robust/stable_frames.h"
@@ -75,6 +76,7 @@ class WindowSolve {
     int old = 0, count = 0;  // frames that are remembered, and all
     std::vector<LitPicture> pictures;
     std::vector<const float*> cells;
+    std::vector<LightCurve> curves;  // from their light to unit light
     std::vector<int64_t> numbers;  // of the frames
     std::vector<int> snapshots;    // of the window
     Recollection recollection;
@@ -94,6 +96,10 @@ class WindowSolve {
   void find_brightest();
   void fill_ends(int snapshot, uint8_t* bits) const;
   void take_background(const Looks& looks, const EarlierWindow& earlier);
+  void find_curves(Looks* looks) const;
+  void choose_curves(const Looks& looks);
+  void follow_curves(const Looks& looks);
+  void bend(size_t cell, const LightCurve& curve);
   void recall_spread(const EarlierWindow& earlier, std::vector<uint8_t>* spread) const;
   SampleLight light(int snapshot) const {
     return {gains_[static_cast<size_t>(snapshot)], context_.range()};

@@ -186,54 +186,10 @@ bool WindowSolve::is_shown(int64_t number) const {
   return has(t) && (window_->number(static_cast<int>(t)) == number || has(t + 1));
 }
 
-// Frames that something disturbs have the light of those before them.
-void WindowSolve::carry_gains() {
-  if (shown_.empty()) return;
-  size_t at = 0;
-  for (size_t t = 0; t < gains_.size(); ++t) {
-    while (at + 1 < shown_.size() && static_cast<size_t>(shown_[at + 1]) <= t) ++at;
-    gains_[t] = gains_[static_cast<size_t>(shown_[at])];
-  }
-}
-
-// The gain of the earlier picture over these frames' median.
-Gain WindowSolve::light_of_earlier(const EarlierWindow& earlier, const GridFrames& here) const {
-  LightScratch scratch(context_.grid.cells());
-  return context_.of_format(light_over(earlier.cells(), 0, here, 0, &scratch));
-}
-
-// True where the brighter one of the earlier picture and these frames' median has samples at the
-// end of their range.
-bool WindowSolve::has_ends(const EarlierWindow& earlier, const Gain& of_earlier,
-                           const GridFrames& here) const {
-  const Gain brighter = {1 / of_earlier[0], 1 / of_earlier[1], 1 / of_earlier[2]};
-  return at_end(here, 0, brighter) || at_end(earlier.cells(), 0, of_earlier);
-}
-
-// A darker picture of earlier windows knows more than samples at the end of their range: unit light
-// becomes its light, and `here` is what it shows where these frames say only "at least". gain: its
-// light, over `here`.
-void WindowSolve::take_unit_of(const GridFrames& earlier, const Gain& gain, GridFrames* here) {
-  const size_t cells = context_.grid.cells();
-  const bool darker = gain[0] < 1 && gain[1] < 1 && gain[2] < 1;
-  for (size_t c = 0; c < kChannels; ++c) {
-    const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
-    for (Gain& of_frame : gains_) of_frame[c] /= unit;
-    float darkest = gains_[0][c];
-    for (const Gain& of_frame : gains_) darkest = std::min(darkest, of_frame[c]);
-    float* const levels = here->plane(0, static_cast<int>(c));
-    const float* const known = earlier.plane(0, static_cast<int>(c));
-    for (size_t cell = 0; cell < cells; ++cell) {
-      levels[cell] *= unit;
-      const bool at_end = levels[cell] * darkest >= steps::light::kNearEnd;
-      if (at_end) levels[cell] = std::max(levels[cell], known[cell] * unit / gain[c]);
-    }
-  }
-}
-
 // The background picture of the stable frames, its thresholds, and the light of each frame.
 void WindowSolve::start(const Known& known) {
-  const Looks looks = gather(known);
+  Looks looks = gather(known);
+  find_curves(&looks);
   const size_t cells = context_.grid.cells();
   // Cells in unit light: as they are, where that is theirs. Memory that nobody needs is not
   // touched.
@@ -254,6 +210,7 @@ void WindowSolve::start(const Known& known) {
       std::transform(channel, channel + cells, to + c * cells,
                      [inverse](float level) { return level * inverse; });
     }
+    looks.curves[i].bend(cells, to);
     if (clips_) unclip(looks.cells[i], looks.median, gain, to);
     chosen.add(to);
   }
@@ -273,97 +230,17 @@ void WindowSolve::start(const Known& known) {
   take_background(looks, *known.earlier);
 }
 
-// Writes a frame's cells in unit light, as far as `median` says what clipped samples hide.
-void WindowSolve::unclip(const float* shown, const GridFrames& median, const Gain& gain,
-                         float* out) const {
-  const size_t cells = context_.grid.cells();
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const auto found = unclipped(
-        {shown[cell], shown[cells + cell], shown[2 * cells + cell]},
-        {median.plane(0, 0)[cell], median.plane(0, 1)[cell], median.plane(0, 2)[cell]}, gain);
-    for (size_t c = 0; c < kChannels; ++c) out[c * cells + cell] = found[c] / gain[c];
-  }
-}
-
-// Frames in which a cell's samples may be at the end of their range say nothing of its background.
-// Where all that show it are such, darker ones that may show the same say it; else the darkest do.
-// chosen: the looks in unit light.
-void WindowSolve::prefer_darker(const Looks& looks, const GridPictures& chosen) {
-  using steps::light::kAtEnd, steps::light::kNearEnd;
-  const size_t cells = context_.grid.cells();
-  std::vector<std::pair<float, uint16_t>> shown, darker;
-  std::vector<uint8_t> keeps(looks.pictures.size()), shows;
-  const auto level = [&](size_t frame, size_t cell) -> std::array<float, kChannels> {
-    const float* const of = looks.cells[frame];
-    return {of[cell], of[cells + cell], of[2 * cells + cell]};
-  };
-  // What most dark frames show.
-  const auto shows_median = [&](size_t frame, size_t cell) {
-    float apart = 0;
-    for (int c = 0; c < kChannels; ++c)
-      apart +=
-          std::abs(chosen.plane(static_cast<int>(frame), c)[cell] - looks.median.plane(0, c)[cell]);
-    return apart < kChannels * steps::light::kNearMedian;
-  };
-  // With what is cut off.
-  const auto brightest = [&](size_t frame, size_t cell) {
-    const auto of = level(frame, cell);
-    float most = std::max({of[0], of[1], of[2]});
-    if (!shows_median(frame, cell)) return most;
-    for (int c = 0; c < kChannels; ++c)
-      most = std::max(most, looks.median.plane(0, c)[cell] *
-                                looks.pictures[frame].gain[static_cast<size_t>(c)]);
-    return most;
-  };
-  // What frame `dark` shows could be what frame `bright` does, too.
-  const auto explains = [&](size_t dark, size_t bright, size_t cell) {
-    const int at = static_cast<int>(dark);
-    return shows_median(dark, cell) &&
-           may_show(
-               level(bright, cell),
-               {chosen.plane(at, 0)[cell], chosen.plane(at, 1)[cell], chosen.plane(at, 2)[cell]},
-               looks.pictures[bright].gain);
-  };
-  for (size_t cell = 0; cell < stable_.of_cell.size(); ++cell) {
-    shown.clear();
-    for (const uint16_t frame : stable_.of_cell[cell])
-      shown.emplace_back(brightest(frame, cell), frame);
-    std::sort(shown.begin(), shown.end());
-    std::fill(keeps.begin(), keeps.end(), uint8_t{0});
-    if (shown.empty() || shown.back().first < kAtEnd) continue;
-    if (shown.front().first >= kNearEnd) {
-      darker.clear();
-      for (size_t frame = 0; frame < keeps.size(); ++frame)
-        if (brightest(frame, cell) < shown.front().first &&
-            explains(frame, shown.front().second, cell))
-          darker.emplace_back(brightest(frame, cell), static_cast<uint16_t>(frame));
-      std::sort(darker.begin(), darker.end());
-      if (!darker.empty()) shown.swap(darker);
-    }
-    const bool any = shown.front().first < kNearEnd;
-    if (!any) {
-      for (auto& [key, frame] : shown) key = luma_gain(looks.pictures[frame].gain);
-      std::sort(shown.begin(), shown.end());
-    }
-    // What is darker says more, if only by some percent.
-    const float most = any ? kNearEnd : shown.front().first * (1 + steps::light::kStill);
-    const size_t count = any ? shown.size() : most_darkest(shown.size());
-    for (size_t i = 0; i < count; ++i) keeps[shown[i].second] = shown[i].first < most;
-    // All of them have shown it.
-    shows = keeps;
-    for (const uint16_t frame : stable_.of_cell[cell]) shows[frame] = 1;
-    stable_.of_cell.take(cell, [&](size_t frame) { return frame < shows.size() && shows[frame]; });
-    stable_.of_cell.choose(cell, [&](size_t frame) { return keeps[frame] != 0; });
-  }
-}
-
 void WindowSolve::take_background(const Looks& looks, const EarlierWindow& earlier) {
   uint8_t* background[kChannels];
   for (size_t c = 0; c < kChannels; ++c) background[c] = reference_.level[c].data();
+  const bool any_curve = std::any_of(looks.curves.begin(), looks.curves.end(),
+                                     [](const LightCurve& curve) { return !curve.none(); });
+  if (any_curve) choose_curves(looks);
   std::vector<uint8_t> spread(context_.pixels());
   ReadAhead ahead(window_->snapshots, looks.snapshots, context_.room.pool->threads());
   median_picture(context_.grid, stable_, looks.pictures, context_.room.pool, background,
                  spread.data(), context_.range(), &ahead);
+  if (any_curve) follow_curves(looks);
   recall_spread(earlier, &spread);
   blur(spread.data(), reference_.width, reference_.height, context_.room.pool, spread_.data());
   const RobustParameters& parameters = context_.parameters;
