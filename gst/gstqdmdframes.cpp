@@ -219,12 +219,13 @@ static void warn_of_areas_outside(State& state, const Settings& settings) {
   const int width = GST_VIDEO_INFO_WIDTH(&state.info), height = GST_VIDEO_INFO_HEIGHT(&state.info);
   const guint outside = settings.wishes.ignored.outside(width, height);
   if (outside == 0) return;
-  GST_ELEMENT_WARNING(state.element, LIBRARY, SETTINGS,
-                      ("ignore has %u rectangles outside of the picture, which is %dx%d: they "
-                       "change nothing. A rectangle is <x, y, width, height> in pixels of the "
-                       "video that comes in.",
-                       outside, width, height),
-                      (nullptr));
+  GST_ELEMENT_WARNING(
+      state.element, LIBRARY, SETTINGS,
+      ("ignore has %u %s outside of the picture, which is %dx%d: there is nothing to "
+       "leave out. A rectangle is <x, y, width, height> in pixels of the video "
+       "that comes in.",
+       outside, outside == 1 ? "rectangle" : "rectangles", width, height),
+      (nullptr));
 }
 
 // Warns once of a picture that has fewer pixels than its size says.

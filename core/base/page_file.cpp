@@ -20,10 +20,13 @@ uint64_t page_size() {
 }
 
 Status refused(const std::string& folder, uint64_t bytes, int error) {
-  return {Status::Code::bad_folder,
-          "The window's frames cannot be kept in '" + folder + "' (" + std::to_string(bytes) +
-              " bytes): " + std::generic_category().message(error) +
-              ". Set window-on-disk to a folder with more room, or lower window-size."};
+  return {
+      Status::Code::bad_folder,
+      "The window's frames cannot be kept in '" + folder + "' (" + std::to_string(bytes) +
+          " bytes): " + std::generic_category().message(error) +
+          (error == ENOSPC || error == EFBIG || error == EDQUOT
+               ? ". Set window-on-disk to a folder with more room, or lower window-size."
+               : ". Set window-on-disk to a folder that exists and that files can be made in.")};
 }
 
 }  // namespace

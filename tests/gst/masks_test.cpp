@@ -129,7 +129,7 @@ TEST(Ignore, SaysWhatIsOutsideOfThePicture) {
   EXPECT_EQ("", element.warning());
   stream.set_caps(GST_VIDEO_FORMAT_RGB, 32, 24);
   stream.push_many(7, 1);
-  EXPECT_NE(std::string::npos, element.warning().find("1 rectangles outside"));
+  EXPECT_NE(std::string::npos, element.warning().find("1 rectangle outside"));
 }
 
 TEST(Ignore, LeavesOutWhatIsNoRectangleAndSaysSo) {
