@@ -66,7 +66,8 @@ class Film:
         self.pipeline.set_state(Gst.State.PLAYING)
 
     def add(self, buffer):
-        picture = buffer.copy()
+        # Python's copy() is another reference to the same buffer.
+        picture = buffer.copy_region(Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.TIMESTAMPS, 0, buffer.get_size())
         picture.pts -= self.begin
         picture.dts = Gst.CLOCK_TIME_NONE
         self.source.emit('push-buffer', picture)
@@ -100,6 +101,7 @@ class Recorder:
         self.pipeline = make_pipeline(options)
         self.sinks = [self.pipeline.get_by_name(name) for name in FILMS]
         self.kept = collections.deque()
+        self.told = collections.deque()  # of frames that are still in a queue
         self.films = None
         self.count = 0
         self.failure = None
@@ -142,14 +144,20 @@ class Recorder:
         print(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}', flush=True)
 
     def see_messages(self, bus):
-        """What the element told of the frame that was pulled last: it tells before it sends."""
         while message := bus.pop_filtered(Gst.MessageType.ELEMENT | Gst.MessageType.ERROR):
             if message.type == Gst.MessageType.ERROR:
                 self.failure = f'{message.src.name}: {message.parse_error()[0].message}'
                 return
-            fields = message.get_structure()
-            if fields.get_name() != 'qdmdbackground-object':
-                continue
+            if message.get_structure().get_name() == 'qdmdbackground-object':
+                self.told.append(message)
+
+    def take_events(self, newest):
+        """Those of frames up to the one that was pulled last: the element tells before it sends."""
+        while self.told:
+            fields = self.told[0].get_structure()
+            if newest < fields.get_value('timestamp') < Gst.CLOCK_TIME_NONE:
+                return
+            self.told.popleft()
             event = fields.get_string('event')
             if event == 'motion-begins' and not self.films and self.kept:
                 self.begin()
@@ -186,10 +194,12 @@ class Recorder:
             while newest - self.kept[0][0].get_buffer().pts > self.before:
                 self.kept.popleft()
             self.see_messages(bus)
+            self.take_events(newest)
             if self.stopped:
                 self.pipeline.send_event(Gst.Event.new_eos())
                 self.stopped = False
         self.see_messages(bus)
+        self.take_events(Gst.CLOCK_TIME_NONE)
         self.end()
         self.pipeline.set_state(Gst.State.NULL)
         self.lines.close()

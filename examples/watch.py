@@ -51,7 +51,8 @@ NUMBERS = [0, 0]
 def regions_of(buffer):
     # Python finds a region by its number alone, and others than ours may have the same: on a copy,
     # what has been read gets another one. A thing keeps its number, and new ones have higher ones.
-    copy = buffer.copy()
+    # (Python's copy() is another reference to the same buffer.)
+    copy = buffer.copy_region(Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.META, 0, buffer.get_size())
     left = copy.get_n_meta(GstVideo.video_region_of_interest_meta_api_get_type())
     number, found = NUMBERS[0], []
     while left > 0 and number < NUMBERS[1] + 1000:

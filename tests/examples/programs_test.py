@@ -138,10 +138,14 @@ def record_events(folder):
             assert (folder / 'events' / line['picture']).stat().st_size > 300
     films = {line['film'] for line in lines} - {None}
     assert len(films) == events.count('motion-begins') > 1, films
+    # From two seconds before the frame that told of a motion to the one that told of its end.
+    time_of = {(line['film'], line['event']): line['stream-time'] for line in lines}
     for film in films:
+        begin, end = (time_of[film, f'motion-{what}'] for what in ('begins', 'ends'))
+        frames = round((end - max(0, begin - 2)) * 25) + 1
         for kind in 'video', 'background', 'mask':
             path = folder / 'events' / film.replace('video', kind)
-            assert common.count_frames(path) > 40, f'{path} is too short'
+            assert common.count_frames(path) == frames, f'{path} has not {frames} frames'
     return f'{len(lines)} events, {len(films)} films'
 
 
