@@ -77,8 +77,8 @@ class WindowSolve {
     std::vector<LitPicture> pictures;
     std::vector<const float*> cells;
     std::vector<LightCurve> curves;  // from their light to unit light
-    std::vector<int64_t> numbers;  // of the frames
-    std::vector<int> snapshots;    // of the window
+    std::vector<int64_t> numbers;    // of the frames
+    std::vector<int> snapshots;      // of the window
     Recollection recollection;
     GridFrames median;  // of the window's frames, in unit light; where anybody asks for it
   };
