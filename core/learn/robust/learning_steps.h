@@ -64,8 +64,11 @@ QDMD_STEP float kAllAgree = step("light.all_agree", 0.9f);
 // Logarithms of ratios of light: the width of the bins in which the most frequent one is found, and
 // how near to it the ratios are whose median is the gain.
 QDMD_STEP float kBin = step("light.bin", 0.02f), kNear = step("light.near", 0.05f);
-// Cells: fewer that have a ratio say nothing.
+// Cells: fewer that have a ratio say nothing, nor do fewer of a part of the levels.
 QDMD_STEP size_t kLeastRatios = step("light.least_ratios", size_t{16});
+// Parts of the levels in which a curve is known. Half of a part's cells must be within kNearMedian
+// of their median, and a curve must make kFollowed more of all cells agree.
+constexpr size_t kKnots = 8;
 }  // namespace light
 
 // ---- Other colours: a camera that switches to infra-red ----

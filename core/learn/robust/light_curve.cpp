@@ -3,25 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "core/learn/robust/learning_steps.h"
+#include <vector>
 
 namespace qdmd {
 namespace {
 
 using namespace steps::light;
 
-constexpr float kWidth = 256.0f / LightCurve::kKnots;
+constexpr float kWidth = 256.0f / kKnots;
 
 size_t part_of(float level) {
-  return std::min(LightCurve::kKnots - 1, static_cast<size_t>(std::max(level, 0.0f) / kWidth));
+  return std::min(kKnots - 1, static_cast<size_t>(std::max(level, 0.0f) / kWidth));
 }
 
 // Knots in the middle of their part of the levels: those that few cells say anything of have what
 // the nearest other one has.
-void spread_knots(const std::array<bool, LightCurve::kKnots>& known,
-                  std::array<float, LightCurve::kKnots>* added) {
-  const std::array<float, LightCurve::kKnots> found = *added;
+void spread_knots(const std::array<bool, kKnots>& known, std::array<float, kKnots>* added) {
+  const std::array<float, kKnots> found = *added;
   for (size_t knot = 0; knot < found.size(); ++knot)
     for (size_t away = 0; away < found.size(); ++away) {
       const bool below = knot >= away && known[knot - away],
@@ -35,6 +33,43 @@ void spread_knots(const std::array<bool, LightCurve::kKnots>& known,
   // What is brighter stays so.
   for (size_t knot = 1; knot < found.size(); ++knot)
     (*added)[knot] = std::max((*added)[knot], (*added)[knot - 1] - kWidth);
+}
+
+using Cell = std::array<float, kChannels>;
+
+// A cell in both lights.
+struct Seen {
+  Cell before, now;
+};
+
+// Those whose samples are not at the end of their range, where they say too little.
+std::vector<Seen> seen_in_both(const float* picture, const Gain& gain, const float* const unit[3],
+                               size_t cells, bool as_luma) {
+  std::vector<Seen> seen;
+  for (size_t cell = 0; cell < cells; ++cell) {
+    Seen of;
+    bool ends = false;
+    for (size_t c = 0; c < kChannels; ++c) {
+      const float level = picture[c * cells + cell];
+      ends |= level >= kMeasured || unit[c][cell] >= kMeasured;
+      of.before[c] = level / gain[c];
+      of.now[c] = unit[c][cell];
+    }
+    if (ends) continue;
+    for (Cell* in : {&of.before, &of.now})
+      if (as_luma) in->fill(((*in)[0] + (*in)[1] + (*in)[2]) / kChannels);
+    seen.push_back(of);
+  }
+  return seen;
+}
+
+size_t count_agreeing(const std::vector<Seen>& seen, const LightCurve& curve) {
+  return static_cast<size_t>(std::count_if(seen.begin(), seen.end(), [&](const Seen& cell) {
+    float away = 0;
+    for (size_t c = 0; c < kChannels; ++c)
+      away += std::abs(cell.now[c] - cell.before[c] - curve.at(c, cell.before[c]));
+    return away < kChannels * kAgree;
+  }));
 }
 
 }  // namespace
@@ -69,64 +104,30 @@ void LightCurve::divide(size_t count) {
 
 LightCurve LightCurve::between(const float* picture, const Gain& gain, const float* const unit[3],
                                size_t cells, bool as_luma) {
-  using Cell = std::array<float, kChannels>;
-  const auto grey = [&](Cell of) {
-    if (as_luma) of.fill((of[0] + of[1] + of[2]) / kChannels);
-    return of;
-  };
-  const auto from = [&](size_t cell) {
-    Cell of;
-    for (size_t c = 0; c < kChannels; ++c) of[c] = picture[c * cells + cell] / gain[c];
-    return grey(of);
-  };
-  const auto to = [&](size_t cell) { return grey({unit[0][cell], unit[1][cell], unit[2][cell]}); };
-  // Samples at the end of their range say too little.
-  const auto is_measured = [&](size_t cell) {
-    for (size_t c = 0; c < kChannels; ++c)
-      if (picture[c * cells + cell] >= kMeasured || unit[c][cell] >= kMeasured) return false;
-    return true;
-  };
+  const std::vector<Seen> seen = seen_in_both(picture, gain, unit, cells, as_luma);
   LightCurve curve;
-  std::array<std::array<std::vector<float>, kKnots>, kChannels> apart;
-  size_t seen = 0;
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const Cell before = from(cell), now = to(cell);
-    if (!is_measured(cell)) continue;
-    ++seen;
-    for (size_t c = 0; c < (as_luma ? 1 : kChannels); ++c)
-      apart[c][part_of(before[c])].push_back(now[c] - before[c]);
-  }
   for (size_t c = 0; c < (as_luma ? 1 : kChannels); ++c) {
+    std::array<std::vector<float>, kKnots> apart;
+    for (const Seen& cell : seen)
+      apart[part_of(cell.before[c])].push_back(cell.now[c] - cell.before[c]);
     std::array<bool, kKnots> known = {};
     for (size_t knot = 0; knot < kKnots; ++knot) {
-      std::vector<float>& of = apart[c][knot];
+      std::vector<float>& of = apart[knot];
       if (of.size() < kLeastRatios) continue;
       const auto at = of.begin() + std::ssize(of) / 2;
       std::nth_element(of.begin(), at, of.end());
       const float middle = *at;
+      const auto near = std::count_if(of.begin(), of.end(),
+                                      [&](float d) { return std::abs(d - middle) < kNearMedian; });
       // Else something hides most of them.
-      known[knot] = 2 * std::count_if(of.begin(), of.end(),
-                                      [&](float d) { return std::abs(d - middle) < kNearMedian; }) >
-                    std::ssize(of);
+      known[knot] = 2 * near > std::ssize(of);
       if (known[knot]) curve.added_[c][knot] = middle;
     }
     spread_knots(known, &curve.added_[c]);
   }
   if (as_luma) curve.added_[1] = curve.added_[2] = curve.added_[0];
-  size_t agreed = 0, agree = 0;
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const Cell before = from(cell), now = to(cell);
-    if (!is_measured(cell)) continue;
-    float away = 0, left = 0;
-    for (size_t c = 0; c < kChannels; ++c) {
-      away += std::abs(now[c] - before[c]);
-      left += std::abs(now[c] - before[c] - curve.at(c, before[c]));
-    }
-    agreed += away < kChannels * kAgree;
-    agree += left < kChannels * kAgree;
-  }
-  if (static_cast<float>(agree) <=
-      static_cast<float>(agreed) + kFollowed * static_cast<float>(seen))
+  if (static_cast<float>(count_agreeing(seen, curve)) <=
+      static_cast<float>(count_agreeing(seen, {})) + kFollowed * static_cast<float>(seen.size()))
     return {};
   curve.none_ = false;
   return curve;

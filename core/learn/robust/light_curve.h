@@ -4,10 +4,9 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
 
 #include "core/base/channels.h"
-#include "core/passes/grid.h"
+#include "core/learn/robust/learning_steps.h"
 
 namespace qdmd {
 
@@ -16,10 +15,7 @@ namespace qdmd {
 // both lights say it.
 class LightCurve {
  public:
-  // Levels, R, G or B of 0 to 255 in unit light, between knots.
-  static constexpr size_t kKnots = 8;
-
-  // What is to be added to a level of that channel.
+  // What is to be added to a level (0 to 255, in unit light) of that channel: R, G or B.
   float at(size_t channel, float level) const;
   // Adds it to a picture's cells, in place.
   void bend(size_t cells, float* picture) const;
@@ -37,7 +33,7 @@ class LightCurve {
   bool none() const { return none_; }
 
  private:
-  std::array<std::array<float, kKnots>, kChannels> added_ = {};
+  std::array<std::array<float, steps::light::kKnots>, kChannels> added_ = {};
   bool none_ = true;
 };
 
