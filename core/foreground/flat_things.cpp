@@ -72,25 +72,20 @@ bool FlatThings::differs(const Planes& planes, int col, int row) const {
 
 FlatThings::Look FlatThings::look_at(const uint8_t* const planes[3], size_t first,
                                      size_t stride) const {
-  // Sums of a block, 24 differences at most, have room in 16 bits.
-  int16_t samples[kSamples];
+  Look look = {};
+  int above[kAlong] = {};
   for (int i = 0; i < kAlong; ++i) {
-    const size_t row = first + static_cast<size_t>(i * step_) * stride;
-    for (int j = 0; j < kAlong; ++j)
-      samples[kAlong * i + j] =
-          static_cast<int16_t>(bright(planes, row + static_cast<size_t>(j * step_)));
+    int before = 0;
+    for (int j = 0; j < kAlong; ++j) {
+      const int sample = bright(
+          planes, first + static_cast<size_t>(i * step_) * stride + static_cast<size_t>(j * step_));
+      look.bright += sample;
+      if (j > 0) look.contrast += std::abs(sample - before);
+      if (i > 0) look.contrast += std::abs(sample - above[j]);
+      above[j] = before = sample;
+    }
   }
-  const auto apart = [&](int a, int b) {
-    return static_cast<int16_t>(std::abs(samples[a] - samples[b]));
-  };
-  int16_t sum = 0, contrast = 0;
-  for (int i = 0; i < kSamples; ++i) sum = static_cast<int16_t>(sum + samples[i]);
-  for (int i = kAlong; i < kSamples; ++i)
-    contrast = static_cast<int16_t>(contrast + apart(i, i - kAlong));
-  for (int i = 0; i < kAlong; ++i)
-    for (int j = 1; j < kAlong; ++j)
-      contrast = static_cast<int16_t>(contrast + apart(kAlong * i + j, kAlong * i + j - 1));
-  return {contrast, sum};
+  return look;
 }
 
 bool FlatThings::is_flat(const Look& look, const Look& level, size_t block) const {
