@@ -105,6 +105,7 @@ class Recorder:
         self.films = None
         self.count = 0
         self.failure = None
+        self.ended = False
         self.stopped = False
 
     def name(self, what, ending):
@@ -143,10 +144,14 @@ class Recorder:
         thing = f' {line["id"]}' if 'id' in line else ''
         print(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}', flush=True)
 
-    def see_messages(self, bus):
-        while message := bus.pop_filtered(Gst.MessageType.ELEMENT | Gst.MessageType.ERROR):
+    def see_messages(self, wait=0):
+        bus = self.pipeline.get_bus()
+        while message := bus.timed_pop_filtered(
+                wait, Gst.MessageType.ELEMENT | Gst.MessageType.EOS | Gst.MessageType.ERROR):
             if message.type == Gst.MessageType.ERROR:
                 self.failure = f'{message.src.name}: {message.parse_error()[0].message}'
+            if message.type != Gst.MessageType.ELEMENT:
+                self.ended = True
                 return
             if message.get_structure().get_name() == 'qdmdbackground-object':
                 self.told.append(message)
@@ -170,9 +175,10 @@ class Recorder:
         samples = []
         for sink in self.sinks:
             while not (sample := sink.emit('try-pull-sample', Gst.SECOND // 5)):
-                if sink.get_property('eos') or self.failure:
+                # The first film ends before the element has told what is gone: wait for the pipeline's end.
+                self.see_messages(Gst.SECOND // 5 if sink.get_property('eos') else 0)
+                if self.ended:
                     return None
-                self.see_messages(self.pipeline.get_bus())
                 if self.stopped:
                     self.pipeline.send_event(Gst.Event.new_eos())
                     self.stopped = False
@@ -184,7 +190,6 @@ class Recorder:
 
     def run(self):
         signal.signal(signal.SIGINT, self.stop)
-        bus = self.pipeline.get_bus()
         self.pipeline.set_state(Gst.State.PLAYING)
         while samples := self.pull():
             if self.films:
@@ -193,12 +198,11 @@ class Recorder:
             newest = samples[0].get_buffer().pts
             while newest - self.kept[0][0].get_buffer().pts > self.before:
                 self.kept.popleft()
-            self.see_messages(bus)
+            self.see_messages()
             self.take_events(newest)
             if self.stopped:
                 self.pipeline.send_event(Gst.Event.new_eos())
                 self.stopped = False
-        self.see_messages(bus)
         self.take_events(Gst.CLOCK_TIME_NONE)
         self.end()
         self.pipeline.set_state(Gst.State.NULL)

@@ -132,7 +132,7 @@ def record_events(folder):
     told = [(line['id'], line['event']) for line in lines if line['event'] in ('appeared', 'gone')]
     assert len(told) == len(set(told)), 'each thing appears once, and is gone once'
     assert {thing for thing, event in told if event == 'appeared'} == {
-        thing for thing, event in told if event == 'gone'}
+        thing for thing, event in told if event == 'gone'}, f'each thing that appears is gone at the end: {told}'
     for line in lines:
         if 'picture' in line:
             assert (folder / 'events' / line['picture']).stat().st_size > 300
@@ -231,7 +231,7 @@ def messages_as_documented(folder):
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
               watch_errors, record_events, record_motion, record_nothing, record_errors, messages_as_documented,
-              readme_gives_frames_and_masks,              two_pads_simulated, two_pads_film, run_demo]
+              readme_gives_frames_and_masks, two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         common.make_film(folder / 'film.avi')
