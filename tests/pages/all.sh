@@ -8,7 +8,7 @@
 #   tests/pages/all.sh quality      what can share the machine
 #   tests/pages/all.sh masks speed  these pages
 #
-# build/all has what each page's script said. Results of an earlier tree go first. Left out:
+# build/all has what each page's script said. Each begins without results of earlier runs. Left out:
 # reliability.sh, whose logs are runs of hours, and window_on_disk.sh, which needs a disk of its own.
 set -uo pipefail
 source "$(dirname "$0")/common.sh"
@@ -21,6 +21,11 @@ case "${1:-all}" in
   quality) pages=$quality ;;
   *) pages=$* ;;
 esac
+
+for page in $pages; do
+  [[ "$page" != */* && "$page" != all && -x tests/pages/$page.sh ]] ||
+    { echo "No script makes a page '$page': see tests/pages." >&2; exit 2; }
+done
 
 git describe --always --dirty | tee "$results/tree"
 failed=0
