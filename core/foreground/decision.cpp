@@ -512,9 +512,9 @@ bool Decision::knows_light() const {
 void Decision::keep_flat_things() {
   flat_.keep({planes(), differing_row(0)}, now_.pool, foreground_row(0));
   if (!steps_.light || !knows_light()) return;
-  flat_.visit_areas([&](const Rectangle& area) {
-    for (int y = area.y; y < area.y + area.height; ++y) {
-      Run run(y, area.x, area.width);
+  flat_.visit_runs(now_.pool, [&](int y, int left, int count) {
+    for (const int end = left + count; left < end; left += kLongestRun) {
+      Run run(y, left, std::min(kLongestRun, end - left));
       look_at(&run);
       leave_shadows(run);
     }

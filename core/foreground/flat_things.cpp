@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "core/foreground/flat_things.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
-#include "core/foreground/mask_runs.h"
 #include "core/foreground/parts.h"
-#include "core/passes/bands.h"
 
 namespace qdmd {
 namespace {
@@ -39,13 +37,14 @@ FlatThings::FlatThings(int width, int height, int step, Colours colours,
   flat_at_.resize(blocks);
   flat_.reserve(blocks);
   in_rows_ = RowLists<Flat>(static_cast<size_t>(rows_), static_cast<size_t>(cols_));
+  near_.resize(static_cast<size_t>(cols_ + 1) * static_cast<size_t>(rows_ + 1));
 }
 
 uint64_t FlatThings::bytes(int width, int height, int step) {
   const auto cols = static_cast<uint64_t>(width / (kAlong * step)),
              rows = static_cast<uint64_t>(height / (kAlong * step));
   return cols * rows * (sizeof(float) + sizeof(uint8_t) + 3 * sizeof(uint32_t) + sizeof(Flat)) +
-         RowLists<Flat>::bytes(rows, cols);
+         RowLists<Flat>::bytes(rows, cols) + (cols + 1) * (rows + 1);
 }
 
 void FlatThings::forget() {
@@ -186,8 +185,22 @@ void FlatThings::keep(const Planes& planes, Pool* pool, uint8_t* foreground) {
   find_flat(planes, pool);
   find_things();
   ++frames_;
-  for (size_t flat = 0; flat < flat_.size(); ++flat)
-    if (is_thing(flat)) paint(planes, flat_[flat], foreground);
+  if (std::exchange(any_, false)) std::fill(near_.begin(), near_.end(), uint8_t{0});
+  for (size_t flat = 0; flat < flat_.size(); ++flat) {
+    if (!is_thing(flat)) continue;
+    any_ = true;
+    paint(planes, flat_[flat], foreground);
+    mark_near(flat_[flat]);
+  }
+}
+
+void FlatThings::mark_near(const Flat& flat) {
+  const int col = static_cast<int>(flat.block) % cols_, row = static_cast<int>(flat.block) / cols_;
+  const int left = std::max(col - 1, 0), end = col + 2;
+  for (int i = std::max(row - 1, 0); i < row + 2; ++i) {
+    const auto first = near_.begin() + static_cast<ptrdiff_t>(i) * (cols_ + 1);
+    std::fill(first + left, first + end, uint8_t{255});
+  }
 }
 
 }  // namespace qdmd

@@ -3,6 +3,7 @@
 // look.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -11,8 +12,10 @@
 #include "core/base/ignored_areas.h"
 #include "core/foreground/compared_planes.h"
 #include "core/foreground/decision_steps.h"
+#include "core/foreground/mask_runs.h"
 #include "core/foreground/row_lists.h"
 #include "core/parallel/pool.h"
+#include "core/passes/bands.h"
 
 namespace qdmd {
 
@@ -38,12 +41,10 @@ class FlatThings {
   // Sets things to 255 in `foreground`, whose rows are as far apart as L's. Learns from each frame.
   // pool: may be null.
   void keep(const Planes& planes, Pool* pool, uint8_t* foreground);
-  // Visits the areas where that may have been. They overlap.
+  // Visits where that may have been, each pixel once, on several threads at once: visit(y, left,
+  // count), columns of a row of pixels.
   template <typename Visit>
-  void visit_areas(const Visit& visit) const {
-    for (size_t flat = 0; flat < flat_.size(); ++flat)
-      if (is_thing(flat)) visit(around(flat_[flat]));
-  }
+  void visit_runs(Pool* pool, const Visit& visit) const;
 
  private:
   struct Look {
@@ -67,6 +68,8 @@ class FlatThings {
   void find_things();
   Rectangle around(const Flat& flat) const;
   void paint(const Planes& planes, const Flat& flat, uint8_t* foreground) const;
+  // Where a thing may have been: blocks, with those at the ends that are not whole.
+  void mark_near(const Flat& flat);
 
   DecisionConstants constants_;
   int width_, height_, step_, side_, cols_, rows_;
@@ -80,6 +83,28 @@ class FlatThings {
   std::vector<uint32_t> flat_at_;      // by block: 1 + which of flat_, or 0
   std::vector<Flat> flat_;
   RowLists<Flat> in_rows_;
+  bool any_ = false;           // things in this frame
+  std::vector<uint8_t> near_;  // a thing: 255
 };
+
+template <typename Visit>
+void FlatThings::visit_runs(Pool* pool, const Visit& visit) const {
+  if (!any_) return;
+  const int cols = cols_ + 1, rows = rows_ + 1;
+  for_rows(pool, rows, static_cast<size_t>(width_) * static_cast<size_t>(height_),
+           [&](int first, int size) {
+             for (int row = first; row < first + size; ++row) {
+               const uint8_t* const near =
+                   near_.data() + static_cast<size_t>(row) * static_cast<size_t>(cols);
+               const int bottom = std::min((row + 1) * side_, height_);
+               for (int col = next_of(near, 0, cols, 255); col < cols;) {
+                 const int end = next_of(near, col, cols, 0);
+                 const int left = col * side_, right = std::min(end * side_, width_);
+                 for (int y = row * side_; y < bottom; ++y) visit(y, left, right - left);
+                 col = next_of(near, end, cols, 255);
+               }
+             }
+           });
+}
 
 }  // namespace qdmd
