@@ -24,13 +24,24 @@ ImageView view_of(const scene::Picture& picture) {
   return view;
 }
 
+std::vector<Region> regions_of(const uint8_t* mask, RegionFinder* finder) {
+  return finder->find(mask, nullptr, kWidth, kHeight, ObjectTracker::least_area(kHeight, {}), true);
+}
+
+std::vector<Region> true_regions(const scene::Plane& labels, RegionFinder* finder) {
+  std::vector<uint8_t> mask(labels.samples.begin(), labels.samples.end());
+  for (uint8_t& sample : mask) sample = sample == scene::kObjectLabel ? 255 : 0;
+  return regions_of(mask.data(), finder);
+}
+
 void require(const Status& status) {
   if (!status.ok()) throw std::runtime_error(status.message);
 }
 
 }  // namespace
 
-ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool live) {
+ObservedScene observe(const std::string& name, uint64_t seed, int frames, MasksOf masks) {
+  const bool live = masks == MasksOf::live, truth = masks == MasksOf::truth;
   ObservedScene result = {name, seed, kWidth, kHeight, kRate, {}};
   scene::Scene scene({kWidth, kHeight, kRate, seed, nullptr}, name);
   Engine engine;
@@ -49,8 +60,7 @@ ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool l
       const uint8_t* const mask = leaving->mask();
       result.mask_seconds += seconds_since(begin);
       const auto middle = std::chrono::steady_clock::now();
-      frame.regions =
-          finder.find(mask, nullptr, kWidth, kHeight, ObjectTracker::least_area(kHeight, {}), true);
+      frame.regions = regions_of(mask, &finder);
       result.region_seconds += seconds_since(middle);
       UncoveredPlace place;
       while (live && leaving->next_uncovered(&place))
@@ -61,13 +71,17 @@ ObservedScene observe(const std::string& name, uint64_t seed, int frames, bool l
     }
   };
   for (int k = 0; k < frames; ++k) {
-    scene.render(k, scene::kFrame | scene::kBoxes);
+    scene.render(k, scene::kFrame | scene::kBoxes | (truth ? scene::kLabels : 0u));
     ObservedFrame& frame = result.frames.emplace_back();
     for (size_t i = 0; i < scene.boxes().size(); ++i) {
       const scene::Box& box = scene.boxes()[i];
       frame.truth.push_back(
           {static_cast<int64_t>(scene.owners()[i]),
            {double(box.x), double(box.y), double(box.width), double(box.height)}});
+    }
+    if (truth) {
+      frame.regions = true_regions(scene.labels(), &finder);
+      continue;
     }
     const auto begin = std::chrono::steady_clock::now();
     require(engine.push(view_of(scene.frame())));

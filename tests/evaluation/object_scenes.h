@@ -33,8 +33,11 @@ inline double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+// Whose masks: the element's in a mode, or the true ones, which say what the tracker does alone.
+enum class MasksOf { live, batch, truth };
+
 // Runs the engine over a scene of 320x240 pixels.
-ObservedScene observe(const std::string& scene, uint64_t seed, int frames, bool live);
+ObservedScene observe(const std::string& scene, uint64_t seed, int frames, MasksOf masks);
 
 // To a file and back, so that trackers can be compared without masks being made anew.
 void write(const ObservedScene& scene, std::ostream* out);

@@ -105,11 +105,17 @@ void EventScores::add(const EventScores& other) {
 }
 
 EventScores score_events(const std::vector<TimedEvent>& truth, const std::vector<TimedEvent>& told,
-                         ObjectEvent::Kind kind, int last, const char* verbose) {
+                         const TrueBox& true_box, ObjectEvent::Kind kind, int last,
+                         const char* verbose) {
   EventScores scores;
   std::vector<char> taken(told.size());
   const bool whole =
       kind == ObjectEvent::Kind::motion_begins || kind == ObjectEvent::Kind::motion_ends;
+  const bool is_past = kind == ObjectEvent::Kind::gone || kind == ObjectEvent::Kind::removed;
+  const auto box_of = [&](const TimedEvent& event, int frame) {
+    const ObjectBox* const box = is_past ? nullptr : true_box(event.owner, frame);
+    return box ? *box : event.box;
+  };
   const auto show = [&](const char* what, const TimedEvent& event, int delay) {
     if (verbose)
       std::printf("  %s: %s %s frame %d delay %d at %.0f,%.0f %.0fx%.0f\n", verbose, what,
@@ -125,7 +131,7 @@ EventScores score_events(const std::vector<TimedEvent>& truth, const std::vector
       if (one.kind != kind || taken[static_cast<size_t>(&one - told.data())]) continue;
       const int delay = one.frame - event.frame;
       if (delay < -kEarly || delay > kMuchLate) continue;
-      if (!whole && overlap(one.box, event.box) < kPair) continue;
+      if (!whole && overlap(one.box, box_of(event, one.frame)) < kPair) continue;
       if (!best || one.frame < best->frame) best = &one;
     }
     if (!best) {

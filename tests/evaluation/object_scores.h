@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -52,11 +53,17 @@ struct EventScores {
   void add(const EventScores& other);
 };
 
+// The true box of an owner in a frame; null: it has none there.
+using TrueBox = std::function<const ObjectBox*(int64_t owner, int frame)>;
+
 // An event is told in time from kEarly frames before its condition holds until kLate after it, with
-// a box that overlaps the true one by half; until kMuchLate it is late. Each is counted once.
+// a box that overlaps the true one by half; until kMuchLate it is late. Each is counted once. What
+// moves is somewhere else by then: the box is compared with the owner's in the frame that tells it.
+// Of what is gone or was removed, and where the owner has none, with the true event's.
 inline constexpr int kEarly = 10, kLate = 10, kMuchLate = 75;
 // Those of one kind; last: of the frames. verbose: prints what is not as it should be.
 EventScores score_events(const std::vector<TimedEvent>& truth, const std::vector<TimedEvent>& told,
-                         ObjectEvent::Kind kind, int last, const char* verbose);
+                         const TrueBox& true_box, ObjectEvent::Kind kind, int last,
+                         const char* verbose);
 
 }  // namespace qdmd::evaluation

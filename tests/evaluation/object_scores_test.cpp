@@ -56,12 +56,32 @@ TEST(EventScores, AreInTimeLateMissedOrWrong) {
                                         {Kind::gone, 8, 111, there},
                                         {Kind::gone, 9, 300, there},
                                         {Kind::stopped, 9, 300, here}};
-  const EventScores scores = score_events(truth, told, Kind::gone, 999, nullptr);
+  const auto nowhere = [](int64_t, int) -> const ObjectBox* { return nullptr; };
+  const EventScores scores = score_events(truth, told, nowhere, Kind::gone, 999, nullptr);
   EXPECT_EQ(3, scores.true_events) << "one comes too late to be told";
   EXPECT_EQ(1, scores.in_time);
   EXPECT_EQ(1, scores.late);
   EXPECT_EQ(1, scores.missed);
   EXPECT_EQ(1, scores.wrong);
+}
+
+TEST(EventScores, FollowWhatMoves) {
+  // Five pixels a frame.
+  ObjectBox now;
+  const auto moving = [&now](int64_t owner, int frame) -> const ObjectBox* {
+    now = {5.0 * frame, 0, 10, 10};
+    return owner == 1 ? &now : nullptr;
+  };
+  const auto at = [&](int frame) { return *moving(1, frame); };
+  const auto in_time = [&](const ObjectBox& told, Kind kind) {
+    const std::vector<TimedEvent> truth = {{kind, 1, 100, at(100)}},
+                                  events = {{kind, 7, 104, told}};
+    return score_events(truth, events, moving, kind, 999, nullptr).in_time;
+  };
+  EXPECT_EQ(1, in_time(at(104), Kind::appeared)) << "where it is when it is told";
+  EXPECT_EQ(0, in_time(at(100), Kind::appeared)) << "where it was";
+  EXPECT_EQ(1, in_time(at(100), Kind::gone)) << "where it was seen last";
+  EXPECT_EQ(0, in_time(at(104), Kind::gone));
 }
 
 }  // namespace

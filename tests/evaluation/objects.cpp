@@ -182,9 +182,15 @@ void score(const ObservedScene& scene, bool verbose, Row* row) {
   row->frames += std::ssize(scene.frames);
   row->mask_seconds += scene.mask_seconds, row->region_seconds += scene.region_seconds;
   const std::vector<TimedEvent> truth = true_events(scene, options);
+  const auto true_box = [&](int64_t owner, int frame) -> const ObjectBox* {
+    for (const NumberedBox& one : scene.frames[static_cast<size_t>(frame)].truth)
+      if (one.id == owner) return &one.box;
+    return nullptr;
+  };
   const std::string name = scene.scene + " " + std::to_string(scene.seed);
   for (Kind kind : kKinds)
-    row->events[kind].add(score_events(truth, told, kind, static_cast<int>(scene.frames.size()) - 1,
+    row->events[kind].add(score_events(truth, told, true_box, kind,
+                                       static_cast<int>(scene.frames.size()) - 1,
                                        verbose ? name.c_str() : nullptr));
 }
 
@@ -236,18 +242,20 @@ int run(int argc, char** argv) {
   CLI::App app("Follows things through simulated scenes and compares what is told with the truth.");
   std::vector<std::string> scenes = {"basic", "stop", "abandon", "remove", "clutter", "bootstrap"};
   int first = 0, seeds = 20, frames = 600;
-  bool batch = false, verbose = false, perfect = false;
+  bool batch = false, truth = false, verbose = false, perfect = false;
   std::string keep, from;
   app.add_option("--scenes", scenes, "scenes, as qdmdscenesrc names them")->delimiter(' ');
   app.add_option("--first-seed", first, "seeds from this one on");
   app.add_option("--seeds", seeds, "how many seeds");
   app.add_option("--frames", frames, "of each scene");
   app.add_flag("--batch", batch, "mode=batch in place of live");
+  app.add_flag("--true-masks", truth, "the scene's masks in place of the element's");
   app.add_flag("--verbose", verbose, "print each event that is missed, late or wrong");
   app.add_flag("--perfect", perfect, "fail where an event is missed, late or wrong");
   app.add_option("--keep", keep, "write what the masks showed to this file");
   app.add_option("--from", from, "take what masks showed from this file, and make none");
   CLI11_PARSE(app, argc, argv);
+  const MasksOf masks = truth ? MasksOf::truth : batch ? MasksOf::batch : MasksOf::live;
   std::map<std::string, Row> rows;
   const auto is_wanted = [&](const ObservedScene& scene) {
     return std::find(scenes.begin(), scenes.end(), scene.scene) != scenes.end() &&
@@ -263,13 +271,13 @@ int run(int argc, char** argv) {
     if (!keep.empty()) out.open(keep);
     for (const std::string& name : scenes)
       for (int seed = first; seed < first + seeds; ++seed) {
-        const ObservedScene scene = observe(name, static_cast<uint64_t>(seed), frames, !batch);
+        const ObservedScene scene = observe(name, static_cast<uint64_t>(seed), frames, masks);
         if (!keep.empty()) write(scene, &out);
         score(scene, verbose, &rows[name]);
       }
   }
   print(rows);
-  if (from.empty()) print_costs(rows);
+  if (from.empty() && !truth) print_costs(rows);
   int wrong = 0;
   for (const auto& [scene, row] : rows)
     for (const auto& [kind, scores] : row.events)
