@@ -142,7 +142,15 @@ class Recorder:
             save_picture(fields.get_value('snapshot'), os.path.join(self.folder, line['picture']))
         print(json.dumps(line), file=self.lines, flush=True)
         thing = f' {line["id"]}' if 'id' in line else ''
-        print(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}', flush=True)
+        self.say(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}')
+
+    def say(self, text):
+        try:
+            print(text, flush=True)
+        except BrokenPipeError:
+            # Nobody reads any longer, as after `| head`: that ends the recording, too.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            self.stop()
 
     def see_messages(self, wait=0):
         bus = self.pipeline.get_bus()

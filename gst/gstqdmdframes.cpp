@@ -213,10 +213,17 @@ static void warn_of_no_room(State& state, const EngineReport& engine) {
       (nullptr));
 }
 
-// Warns of rectangles that no pixel of the video is in, once each time that they are set.
-static void warn_of_areas_outside(State& state, const Settings& settings) {
+// Warns of rectangles that no pixel of the video is in, or all of them are, once each time that
+// they are set.
+static void warn_of_areas(State& state, const Settings& settings) {
   if (std::exchange(state.ignored_seen, settings.ignored_set) == settings.ignored_set) return;
   const int width = GST_VIDEO_INFO_WIDTH(&state.info), height = GST_VIDEO_INFO_HEIGHT(&state.info);
+  if (settings.wishes.ignored.cover(width, height))
+    GST_ELEMENT_WARNING(state.element, LIBRARY, SETTINGS,
+                        ("ignore covers the whole picture, which is %dx%d: nothing will ever be "
+                         "foreground. Make its rectangles smaller.",
+                         width, height),
+                        (nullptr));
   const guint outside = settings.wishes.ignored.outside(width, height);
   if (outside == 0) return;
   GST_ELEMENT_WARNING(
@@ -541,7 +548,7 @@ GstFlowReturn take_frame(State& state, BufferPtr buffer) {
   GST_OBJECT_LOCK(state.element);
   const Settings settings = state.settings;
   GST_OBJECT_UNLOCK(state.element);
-  warn_of_areas_outside(state, settings);
+  warn_of_areas(state, settings);
   const bool masks = wants_objects(settings) || state.wants_masks(settings);
   BufferPtr shell(gst_buffer_new());
   gst_buffer_copy_into(

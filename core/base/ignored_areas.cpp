@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <vector>
 
 namespace qdmd {
 
@@ -37,6 +38,21 @@ unsigned IgnoredAreas::outside(int width, int height) const {
     return area.x >= width || area.y >= height || int64_t{area.x} + area.width <= 0 ||
            int64_t{area.y} + area.height <= 0;
   }));
+}
+
+bool IgnoredAreas::cover(int width, int height) const {
+  std::vector<uint8_t> row(static_cast<size_t>(width));
+  const auto covers_row = [&](int64_t y) {
+    if (y < 0 || y >= height) return true;
+    std::fill(row.begin(), row.end(), uint8_t{255});
+    clear(static_cast<int>(y), 0, width, row.data());
+    return std::count(row.begin(), row.end(), uint8_t{0}) == width;
+  };
+  // Rows differ from the one above only where a rectangle begins, or has ended.
+  const auto begin = areas_.begin();
+  return covers_row(0) && std::all_of(begin, begin + count_, [&](const Rectangle& area) {
+           return covers_row(area.y) && covers_row(int64_t{area.y} + area.height);
+         });
 }
 
 void IgnoredAreas::clear(int y, int left, int count, uint8_t* samples) const {

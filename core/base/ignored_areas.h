@@ -31,6 +31,8 @@ class IgnoredAreas {
 
   // How many rectangles have no pixel of a picture of width x height.
   unsigned outside(int width, int height) const;
+  // Whether no pixel of such a picture is left.
+  bool cover(int width, int height) const;
 
   // True where pixel (x, y) is ignored.
   bool has(int x, int y) const {

@@ -24,6 +24,24 @@ IgnoredAreas areas_of(std::initializer_list<Rectangle> rectangles) {
   return areas;
 }
 
+TEST(IgnoredAreas, CoverAPictureOrDoNot) {
+  constexpr int kWidth = 5, kHeight = 4;
+  EXPECT_FALSE(IgnoredAreas().cover(kWidth, kHeight));
+  std::mt19937 rng(341);
+  int covered = 0;
+  for (int round = 0; round < 2000; ++round) {
+    IgnoredAreas areas;
+    for (int i = 0; i < 4; ++i)
+      areas.add({static_cast<int>(rng() % 6) - 2, static_cast<int>(rng() % 5) - 2,
+                 1 + static_cast<int>(rng() % 8), 1 + static_cast<int>(rng() % 7)});
+    bool all = true;
+    for (int p = 0; p < kWidth * kHeight; ++p) all &= covers(areas, p % kWidth, p / kWidth);
+    ASSERT_EQ(all, areas.cover(kWidth, kHeight)) << round;
+    covered += all;
+  }
+  EXPECT_GT(covered, 100);
+}
+
 TEST(IgnoredAreas, ClearWhatTheyCover) {
   constexpr int kWidth = 23, kHeight = 11, kMost = std::numeric_limits<int>::max();
   std::mt19937 rng(340);

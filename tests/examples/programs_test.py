@@ -149,6 +149,18 @@ def record_events(folder):
     return f'{len(lines)} events, {len(films)} films'
 
 
+def record_for_nobody(folder):
+    recorder = subprocess.Popen(
+        [examples / 'recorder.py', 'qdmdscenesrc scene=basic', '--output', 'unread'],
+        cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert recorder.stdout.readline()
+    recorder.stdout.close()
+    errors = recorder.stderr.read()
+    assert recorder.wait(timeout=60) == 0 and not errors, errors
+    assert list((folder / 'unread').glob('*-mask.mkv')), 'what was recorded is kept'
+    return 'ends'
+
+
 def record_motion(folder):
     recorder = subprocess.Popen([examples / 'record.py', '--output', 'motion.mkv'], cwd=folder,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -230,7 +242,7 @@ def messages_as_documented(folder):
 
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
-              watch_errors, record_events, record_motion, record_nothing, record_errors, messages_as_documented,
+              watch_errors, record_events, record_for_nobody, record_motion, record_nothing, record_errors, messages_as_documented,
               readme_gives_frames_and_masks, two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)

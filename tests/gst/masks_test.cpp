@@ -132,6 +132,19 @@ TEST(Ignore, SaysWhatIsOutsideOfThePicture) {
   EXPECT_NE(std::string::npos, element.warning().find("1 rectangle outside"));
 }
 
+TEST(Ignore, SaysThatNothingIsLeft) {
+  Stream stream("qdmdbackground window-size=5", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
+  Element element(stream);
+  const std::string all = std::to_string(kWidth) + "," + std::to_string(kHeight);
+  set_from_text(element.get(), ("<<-1,0," + all + ">>").c_str());
+  stream.push_many(0, 2);
+  EXPECT_EQ("", element.warning());
+  set_from_text(element.get(), ("<<0,0," + all + ">>").c_str());
+  stream.push_many(2, 2);
+  EXPECT_NE(std::string::npos, element.warning().find("covers the whole picture"));
+  EXPECT_EQ("", element.warning());
+}
+
 TEST(Ignore, LeavesOutWhatIsNoRectangleAndSaysSo) {
   Stream stream("qdmdbackground", GST_VIDEO_FORMAT_RGB, kWidth, kHeight);
   Element element(stream);
