@@ -74,7 +74,12 @@ class Recorder:
         self.gate.set_property('drop', not moving)
         self.recordings += moving
         seconds = fields.get_uint64('stream-time').value / Gst.SECOND
-        print(f'{seconds:8.2f} s: {"recording" if moving else "nothing moves"}', flush=True)
+        try:
+            print(f'{seconds:8.2f} s: {"recording" if moving else "nothing moves"}', flush=True)
+        except BrokenPipeError:
+            # Nobody reads any longer, as after `| head`: that ends the recording, too.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            self.finish()
 
     def finish(self):
         self.pipeline.send_event(Gst.Event.new_eos())

@@ -5,7 +5,7 @@
 While something moves, and for the seconds before, three films are written: the frames, the empty
 scene and the mask. `events.jsonl` has a line of JSON for each event that the element tells of (things
 that appear, stop, are left behind or removed, move on, are gone), with the film that shows it and a
-picture of the thing. Ctrl-C ends it.
+picture of the thing. In a folder that has recordings, numbers go on. Ctrl-C ends it.
 
 Needs python3-gi and gir1.2-gstreamer-1.0, and GST_PLUGIN_PATH where the plugin is not installed.
 """
@@ -13,6 +13,7 @@ import argparse
 import collections
 import json
 import os
+import re
 import signal
 import sys
 
@@ -56,8 +57,8 @@ class Film:
     """A file of JPEG pictures that begins with time 0."""
 
     def __init__(self, path, caps, begin):
+        self.path = path
         self.begin = begin
-        self.frames = 0
         self.pipeline = Gst.parse_launch(
             'appsrc name=pictures format=time ! queue ! matroskamux ! filesink name=file')
         self.source = self.pipeline.get_by_name('pictures')
@@ -71,13 +72,24 @@ class Film:
         picture.pts -= self.begin
         picture.dts = Gst.CLOCK_TIME_NONE
         self.source.emit('push-buffer', picture)
-        self.frames += 1
+
+    def failure(self):
+        """Why the film cannot be written, or None."""
+        return text_of(self.pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR), self.path)
 
     def finish(self):
+        """The same, once all is written."""
         self.source.emit('end-of-stream')
-        self.pipeline.get_bus().timed_pop_filtered(10 * Gst.SECOND,
-                                                   Gst.MessageType.EOS | Gst.MessageType.ERROR)
+        message = self.pipeline.get_bus().timed_pop_filtered(10 * Gst.SECOND,
+                                                             Gst.MessageType.EOS | Gst.MessageType.ERROR)
         self.pipeline.set_state(Gst.State.NULL)
+        return text_of(message, self.path)
+
+
+def text_of(message, where):
+    if message and message.type == Gst.MessageType.ERROR:
+        return f'{where}: {message.parse_error()[0].message}'
+    return None
 
 
 def save_picture(sample, path):
@@ -97,13 +109,16 @@ class Recorder:
         self.folder = options.output
         self.before = int(options.before * Gst.SECOND)
         os.makedirs(self.folder, exist_ok=True)
-        self.lines = open(os.path.join(self.folder, 'events.jsonl'), 'w')
+        self.lines = open(os.path.join(self.folder, 'events.jsonl'), 'a+')
+        self.lines.seek(0)
+        self.told_before = sum(1 for _ in self.lines)
         self.pipeline = make_pipeline(options)
         self.sinks = [self.pipeline.get_by_name(name) for name in FILMS]
         self.kept = collections.deque()
         self.told = collections.deque()  # of frames that are still in a queue
         self.films = None
-        self.count = 0
+        self.count = max((int(name[:3]) for name in os.listdir(self.folder)
+                          if re.fullmatch(r'\d{3}-video\.mkv', name)), default=0)
         self.failure = None
         self.ended = False
         self.stopped = False
@@ -122,11 +137,17 @@ class Recorder:
     def add(self, samples):
         for film, sample in zip(self.films, samples):
             film.add(sample.get_buffer())
+            self.fail(film.failure())
 
     def end(self):
         for film in self.films or ():
-            film.finish()
+            self.fail(film.finish())
         self.films = None
+
+    def fail(self, why):
+        if why and not self.failure:
+            self.failure = why
+            self.stop()
 
     def tell(self, fields):
         names = [fields.nth_field_name(i) for i in range(fields.n_fields())]
@@ -138,9 +159,10 @@ class Recorder:
             line.pop(name, None)
         line['film'] = self.name('video', 'mkv') if self.films else None
         if 'snapshot' in names:
-            line['picture'] = f'{line["id"]:05d}-{line["event"]}.jpg'
+            line['picture'] = f'{self.told_before:05d}-{line["event"]}.jpg'
             save_picture(fields.get_value('snapshot'), os.path.join(self.folder, line['picture']))
         print(json.dumps(line), file=self.lines, flush=True)
+        self.told_before += 1
         thing = f' {line["id"]}' if 'id' in line else ''
         self.say(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}')
 
@@ -157,7 +179,7 @@ class Recorder:
         while message := bus.timed_pop_filtered(
                 wait, Gst.MessageType.ELEMENT | Gst.MessageType.EOS | Gst.MessageType.ERROR):
             if message.type == Gst.MessageType.ERROR:
-                self.failure = f'{message.src.name}: {message.parse_error()[0].message}'
+                self.failure = self.failure or text_of(message, message.src.name)
             if message.type != Gst.MessageType.ELEMENT:
                 self.ended = True
                 return
@@ -198,6 +220,7 @@ class Recorder:
 
     def run(self):
         signal.signal(signal.SIGINT, self.stop)
+        signal.signal(signal.SIGTERM, self.stop)
         self.pipeline.set_state(Gst.State.PLAYING)
         while samples := self.pull():
             if self.films:
@@ -225,6 +248,8 @@ def main():
         return Recorder(options).run()
     except GLib.Error as error:
         return error.message
+    except OSError as error:
+        return str(error)
 
 
 sys.exit(main())

@@ -100,6 +100,8 @@ def play(pipeline, options):
     bus.add_signal_watch()
     bus.connect('message', at_message)
     GLib.unix_signal_add(GLib.PRIORITY_DEFAULT, signal.SIGINT, interrupt)
+    # Nobody reads any longer, as after `| head`.
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     pipeline.set_state(Gst.State.PLAYING)
     loop.run()
     return failure[0] if failure else None

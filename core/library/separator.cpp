@@ -401,7 +401,8 @@ void Separator::apply(const void* frame, const Layout& layout, uint8_t* mask,
                       ptrdiff_t mask_row_bytes) {
   if (state_->options.mode != Mode::live)
     throw std::invalid_argument(
-        "apply() gives a mask at once, which mode=batch cannot: use push(), ready() and write()");
+        "apply() gives a mask at once, which mode=batch cannot: push() frames, and take pictures "
+        "when ready() says that there are some");
   Layout of_mask = layout;
   of_mask.row_bytes = mask_row_bytes;
   of_mask.pixels = Pixels::grey;

@@ -5,6 +5,7 @@ Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that 
 """
 import json
 import pathlib
+import resource
 import re
 import signal
 import subprocess
@@ -157,8 +158,26 @@ def record_for_nobody(folder):
     recorder.stdout.close()
     errors = recorder.stderr.read()
     assert recorder.wait(timeout=60) == 0 and not errors, errors
-    assert list((folder / 'unread').glob('*-mask.mkv')), 'what was recorded is kept'
-    return 'ends'
+    films = {path: path.stat().st_size for path in (folder / 'unread').glob('*.mkv')}
+    lines = (folder / 'unread' / 'events.jsonl').read_text()
+    assert films, 'what was recorded is kept'
+    run(folder, examples / 'recorder.py', 'qdmdscenesrc scene=basic num-buffers=250', '--output', 'unread')
+    assert films == {path: path.stat().st_size for path in films}, 'a second recording goes on'
+    assert len(list((folder / 'unread').glob('*.mkv'))) > len(films)
+    assert (folder / 'unread' / 'events.jsonl').read_text().startswith(lines)
+    return 'ends, and goes on'
+
+
+def record_without_room(folder):
+    def few_bytes():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+
+    done = subprocess.run([examples / 'recorder.py', 'qdmdscenesrc scene=basic num-buffers=400', '--output', 'full'],
+                          cwd=folder, timeout=120, capture_output=True, text=True, preexec_fn=few_bytes)
+    assert done.returncode == 1 and 'Could not write' in done.stderr, done.stderr
+    assert 'Traceback' not in done.stderr, done.stderr
+    return done.stderr.strip()
 
 
 def record_motion(folder):
@@ -242,7 +261,8 @@ def messages_as_documented(folder):
 
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
-              watch_errors, record_events, record_for_nobody, record_motion, record_nothing, record_errors, messages_as_documented,
+              watch_errors, record_events, record_for_nobody, record_without_room, record_motion, record_nothing,
+              record_errors, messages_as_documented,
               readme_gives_frames_and_masks, two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
