@@ -7,9 +7,10 @@
 namespace qdmd {
 
 std::unique_ptr<Learner> Learner::make(const LearnOptions& options, int width, int height) {
+  const RobustParameters parameters;  // That reads its steps.
   check_steps();
   if (options.method == Method::robust)
-    return std::make_unique<RobustLearner>(options, width, height);
+    return std::make_unique<RobustLearner>(options, width, height, parameters);
   return std::make_unique<GramLearner>(options, width, height);
 }
 
