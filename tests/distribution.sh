@@ -86,5 +86,5 @@ for part in "$@"; do
 done
 in_root bash -c '. /etc/os-release; printf "%s: %s, %s, " "$(date +%F)" "$PRETTY_NAME" "$(dpkg --print-architecture)"
   printf "g++ %s, GStreamer %s, OpenCV %s, Highway %s, Python %s\n" "$(g++ -dumpfullversion)" \
-    "$(pkg-config --modversion gstreamer-1.0)" "$(pkg-config --modversion opencv4)" \
+    "$(dpkg-query -f "\${source:Upstream-Version}" -W libgstreamer1.0-0)" "$(pkg-config --modversion opencv4)" \
     "$(pkg-config --modversion libhwy 2>/dev/null || echo of the packages)" "$(python3 -c "import platform; print(platform.python_version())")"'
