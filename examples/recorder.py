@@ -111,14 +111,14 @@ class Recorder:
         os.makedirs(self.folder, exist_ok=True)
         self.lines = open(os.path.join(self.folder, 'events.jsonl'), 'a+')
         self.lines.seek(0)
-        self.told_before = sum(1 for _ in self.lines)
+        self.told_lines = sum(1 for _ in self.lines)
         self.pipeline = make_pipeline(options)
         self.sinks = [self.pipeline.get_by_name(name) for name in FILMS]
         self.kept = collections.deque()
         self.told = collections.deque()  # of frames that are still in a queue
         self.films = None
-        self.count = max((int(name[:3]) for name in os.listdir(self.folder)
-                          if re.fullmatch(r'\d{3}-video\.mkv', name)), default=0)
+        films = (re.fullmatch(r'(\d+)-video\.mkv', name) for name in os.listdir(self.folder))
+        self.count = max((int(film[1]) for film in films if film), default=0)
         self.failure = None
         self.ended = False
         self.stopped = False
@@ -159,10 +159,10 @@ class Recorder:
             line.pop(name, None)
         line['film'] = self.name('video', 'mkv') if self.films else None
         if 'snapshot' in names:
-            line['picture'] = f'{self.told_before:05d}-{line["event"]}.jpg'
+            line['picture'] = f'{self.told_lines:05d}-{line["event"]}.jpg'
             save_picture(fields.get_value('snapshot'), os.path.join(self.folder, line['picture']))
         print(json.dumps(line), file=self.lines, flush=True)
-        self.told_before += 1
+        self.told_lines += 1
         thing = f' {line["id"]}' if 'id' in line else ''
         self.say(f'{line["stream-time"]:8.2f} s: {line["event"]}{thing}')
 

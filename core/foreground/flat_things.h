@@ -68,7 +68,6 @@ class FlatThings {
   void find_things();
   Rectangle around(const Flat& flat) const;
   void paint(const Planes& planes, const Flat& flat, uint8_t* foreground) const;
-  // Where a thing may have been: blocks, with those at the ends that are not whole.
   void mark_near(const Flat& flat);
 
   DecisionConstants constants_;
@@ -83,8 +82,9 @@ class FlatThings {
   std::vector<uint32_t> flat_at_;      // by block: 1 + which of flat_, or 0
   std::vector<Flat> flat_;
   RowLists<Flat> in_rows_;
-  bool any_ = false;           // things in this frame
-  std::vector<uint8_t> near_;  // a thing: 255
+  bool any_ = false;  // things in this frame
+  // 255: blocks next to those of things, with the ends of rows and columns that are no whole block.
+  std::vector<uint8_t> near_;
 };
 
 template <typename Visit>

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/engine/engine.h"
+#include "core/parallel/pool.h"
 #include "core/scene/scene.h"
 #include "gtest/gtest.h"
 #include "tests/core/mask_util.h"
@@ -17,6 +18,27 @@ namespace qdmd::test {
 namespace {
 
 constexpr Rectangle kPlace = {40, 30, 48, 32};
+
+// What is visited: each pixel once at most, all that was set to foreground, and nothing far from
+// `place`; nothing at all where nothing was set.
+void check_visits(const FlatThings& things, int width, const std::vector<uint8_t>& foreground,
+                  const Rectangle& place, int margin) {
+  Pool pool(2);
+  std::vector<int> visits(foreground.size());
+  things.visit_runs(&pool, [&](int y, int left, int count) {
+    for (int x = left; x < left + count; ++x) ++visits[static_cast<size_t>(y * width + x)];
+  });
+  for (size_t p = 0; p < visits.size(); ++p) {
+    const int x = static_cast<int>(p) % width, y = static_cast<int>(p) / width;
+    const bool near = x >= place.x - margin && x < place.x + place.width + margin &&
+                      y >= place.y - margin && y < place.y + place.height + margin;
+    ASSERT_LE(visits[p], near ? 1 : 0) << x << ", " << y;
+    ASSERT_GE(visits[p], foreground[p] / 255) << x << ", " << y;
+  }
+  if (std::count(foreground.begin(), foreground.end(), 255) == 0) {
+    ASSERT_EQ(std::count(visits.begin(), visits.end(), 0), std::ssize(visits));
+  }
+}
 
 // The share of kPlace that is found after 40 frames of restless water, in the frame that paint()
 // has changed.
@@ -44,6 +66,8 @@ double found_in(int step, const Paint& paint) {
     planes.x_stride = planes.l_stride = static_cast<size_t>(width);
     foreground.assign(level.pixels(), 0);
     things.keep(planes, nullptr, foreground.data());
+    // Blocks have four samples, and reach one block further.
+    check_visits(things, width, foreground, place, 8 * step);
     if (t < 40) {
       EXPECT_EQ(std::count(foreground.begin(), foreground.end(), 255), 0);
     }

@@ -5,8 +5,8 @@ Usage: programs_test.py SOURCE_ROOT EMBED DEMO TWO_PADS      (the programs that 
 """
 import json
 import pathlib
-import resource
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -168,6 +168,29 @@ def record_for_nobody(folder):
     return 'ends, and goes on'
 
 
+def watch_for_nobody(folder):
+    watch = subprocess.Popen([examples / 'watch.py', 'film.avi'], cwd=folder, text=True,
+                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert watch.stdout.readline()
+    watch.stdout.close()
+    errors = watch.stderr.read()
+    watch.wait(timeout=60)
+    assert not errors, errors
+
+
+def record_until_terminated(folder):
+    (folder / 'ended').mkdir()
+    (folder / 'ended' / '1234-video.mkv').write_bytes(b'')
+    recorder = subprocess.Popen([examples / 'recorder.py', 'qdmdscenesrc scene=basic', '--output', 'ended'], cwd=folder,
+                                text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert recorder.stdout.readline()
+    recorder.terminate()
+    _, errors = recorder.communicate(timeout=60)
+    assert recorder.returncode == 0 and not errors, errors
+    assert common.count_frames(folder / 'ended' / '1235-mask.mkv') > 0
+    return 'the film is whole'
+
+
 def record_without_room(folder):
     def few_bytes():
         resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
@@ -261,8 +284,8 @@ def messages_as_documented(folder):
 
 def main():
     checks = [all_are_known, embed_simulated, embed_film, embed_errors, frames_with_a_gap, watch_simulated, watch_film,
-              watch_errors, record_events, record_for_nobody, record_without_room, record_motion, record_nothing,
-              record_errors, messages_as_documented,
+              watch_errors, record_events, record_for_nobody, watch_for_nobody, record_until_terminated,
+              record_without_room, record_motion, record_nothing, record_errors, messages_as_documented,
               readme_gives_frames_and_masks, two_pads_simulated, two_pads_film, run_demo]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
