@@ -301,6 +301,28 @@ TEST(StableFramesOf, WhatStandsStillShowsByItsContour) {
   }
 }
 
+// Of somebody who stands for most of the window, the legs have nearly the ground's colour. They go
+// with the rest.
+TEST(StableFramesOf, FaintPartsGoWithTheirRegion) {
+  CellScene scene(80);
+  for (int t = 35; t < 80; ++t) {
+    scene.box(t, 8, 12, 8, 190);
+    for (int c = 0; c < kChannels; ++c)
+      for (int y = 16; y < 18; ++y)
+        for (int x = 12; x < 20; ++x) scene.frames.plane(t, c)[y * scene.grid.cols + x] += 8;
+  }
+  const StableFrames stable = scene.stable();
+  scene.expect_background(stable);
+  const auto lists = lists_of(stable);
+  for (int y = 8; y < 18; ++y)
+    for (int x = 12; x < 20; ++x) {
+      const int cell = y * scene.grid.cols + x;
+      EXPECT_LT(lists[static_cast<size_t>(cell)].back(), 35) << y << " " << x;
+      EXPECT_TRUE(std::binary_search(stable.by_contour.begin(), stable.by_contour.end(), cell))
+          << y << " " << x;
+    }
+}
+
 // A part of the background with a contour of its own stays, whatever passes before it.
 TEST(StableFramesOf, TheBackgroundMayHaveContours) {
   CellScene scene(80);

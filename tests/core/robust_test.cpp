@@ -182,6 +182,27 @@ TEST(RobustEngine, WhoStandsStillIsForeground) {
   }
 }
 
+// Somebody in nearly the ground's colour differs by less than a shadow may.
+TEST(RobustEngine, WhoStandsStillInTheGroundsColourIsForeground) {
+  std::vector<uint8_t> ground(3 * kPixels);
+  for (size_t i = 0; i < ground.size(); ++i)
+    ground[i] = static_cast<uint8_t>(80 + i % kWidth / 4 + 10 * (i / kPixels));
+  for (int start : {0, 20, 40}) {
+    Clip clip(kPixels, 100);
+    for (int t = 0; t < 100; ++t) {
+      auto& frame = clip.frames[static_cast<size_t>(t)];
+      frame = ground;
+      if (t < start || t >= start + 60) continue;
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t y = 20; y < 56; ++y)
+          for (size_t x = 36; x < 56; ++x) frame[c * kPixels + y * kWidth + x] += 14;
+    }
+    add_noise(clip, 2, 55);
+    EXPECT_GT(mean_error(temporal_median(clip), ground), 1);
+    EXPECT_LT(worst_error(backgrounds_of(clip), ground), 0.5) << start;
+  }
+}
+
 // ---- Light ----
 
 double worst_error_in_light(const Clip& clip, const std::vector<double>& gains, int iterations) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/near_cells.h"
 #include "core/passes/grid.h"
 
 namespace qdmd {
@@ -36,16 +37,13 @@ class CellRegions {
       auto& region = regions_.emplace_back();
       region.push_back(static_cast<int>(cell));
       region_of_[cell] = id;
-      for (size_t next = 0; next < region.size(); ++next) {
-        const int y = region[next] / grid_.cols, x = region[next] % grid_.cols;
-        for (int yy = std::max(0, y - 1); yy <= std::min(grid_.rows - 1, y + 1); ++yy)
-          for (int xx = std::max(0, x - 1); xx <= std::min(grid_.cols - 1, x + 1); ++xx) {
-            const auto neighbour = static_cast<size_t>(yy * grid_.cols + xx);
-            if (!inside[neighbour] || region_of_[neighbour] >= 0) continue;
-            region_of_[neighbour] = id;
-            region.push_back(static_cast<int>(neighbour));
-          }
-      }
+      for (size_t next = 0; next < region.size(); ++next)
+        each_near(grid_, region[next], 1, [&](int near) {
+          const auto neighbour = static_cast<size_t>(near);
+          if (!inside[neighbour] || region_of_[neighbour] >= 0) return;
+          region_of_[neighbour] = id;
+          region.push_back(near);
+        });
     }
     return regions_;
   }

@@ -7,6 +7,7 @@
 
 #include "core/learn/robust/colour_map.h"
 #include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/near_cells.h"
 #include "core/learn/robust/places.h"
 
 namespace qdmd {
@@ -70,14 +71,6 @@ bool SceneMemory::read(size_t cell, int64_t now, const LearntPlace& from) {
   return true;
 }
 
-template <typename What>
-void SceneMemory::each_near(int cell, int reach, const What& what) const {
-  const int y = cell / grid_.cols, x = cell % grid_.cols;
-  for (int yy = std::max(0, y - reach); yy <= std::min(grid_.rows - 1, y + reach); ++yy)
-    for (int xx = std::max(0, x - reach); xx <= std::min(grid_.cols - 1, x + reach); ++xx)
-      what(yy * grid_.cols + xx);
-}
-
 // Quarters of the cells may be earlier and later: they had something else before them.
 SceneMemory::Change SceneMemory::change_of(const std::vector<int>& region) const {
   std::vector<int64_t> last, since;
@@ -99,9 +92,9 @@ SceneMemory::Motion SceneMemory::motion_around(const std::vector<int>& region,
   std::fill(marks_.begin(), marks_.end(), uint8_t{far});
   around_.clear();
   for (int cell : region)
-    each_near(cell, 1, [&](int at) { marks_[static_cast<size_t>(at)] = beside; });
+    each_near(grid_, cell, 1, [&](int at) { marks_[static_cast<size_t>(at)] = beside; });
   for (int cell : region)
-    each_near(cell, kAround, [&](int at) {
+    each_near(grid_, cell, kAround, [&](int at) {
       uint8_t& mark = marks_[static_cast<size_t>(at)];
       if (mark != far) return;
       // Not what changed with it.
@@ -124,7 +117,7 @@ SceneMemory::Motion SceneMemory::motion_around(const std::vector<int>& region,
   for (int cell : region) marks_[static_cast<size_t>(cell)] = inside;
   size_t cells = 0, unsettled = 0;
   for (int cell : region)
-    each_near(cell, kNear, [&](int at) {
+    each_near(grid_, cell, kNear, [&](int at) {
       uint8_t& mark = marks_[static_cast<size_t>(at)];
       if (mark == near || mark == inside) return;
       mark = near;
@@ -148,7 +141,7 @@ void SceneMemory::decide(const std::vector<int>& region, Of of) {
 bool SceneMemory::left_beside(const std::vector<int>& region) const {
   bool found = false;
   for (int cell : region)
-    each_near(cell, 1, [&](int near) {
+    each_near(grid_, cell, 1, [&](int near) {
       if (said_.left(near) == Judgements::kNever) return;
       const int64_t ago = looks_.newest() - said_.left(near);
       if (ago > kPieces) return;
@@ -160,7 +153,8 @@ bool SceneMemory::left_beside(const std::vector<int>& region) const {
 
 bool SceneMemory::came_beside(const std::vector<int>& region) const {
   bool found = false;
-  for (int cell : region) each_near(cell, 1, [&](int near) { found |= of(near) == Of::came; });
+  for (int cell : region)
+    each_near(grid_, cell, 1, [&](int near) { found |= of(near) == Of::came; });
   return found;
 }
 
@@ -305,7 +299,7 @@ void SceneMemory::widen(const float* const background[3]) {
   for (int step = 0; step < kRim; ++step) {
     const size_t end = found_.size();
     for (size_t i = first; i < end; ++i)
-      each_near(found_[i], 1, [&](int near) {
+      each_near(grid_, found_[i], 1, [&](int near) {
         const auto at = static_cast<size_t>(near);
         if (marks_[at] || !looks_.shows_look(near)) return;
         if (of(near) == Of::came) return;
@@ -346,7 +340,7 @@ void SceneMemory::hand_over(Proofs* solve) {
   // What stands there reaches into the cells around.
   for (size_t cell = 0; cell < marks_.size(); ++cell)
     if (marks_[cell])
-      each_near(static_cast<int>(cell), kRim, [&](int near) {
+      each_near(grid_, static_cast<int>(cell), kRim, [&](int near) {
         const auto at = static_cast<size_t>(near);
         if (solve->came[at] || of(near) == Of::left) return;
         solve->came[at] = 1;

@@ -124,8 +124,6 @@ class SceneMemory {
   float apart(int cell, const float* const background[3]) const;
   // What was said of what the cell shows now.
   Of of(int cell) const { return said_.of(cell, looks_.since(cell)); }
-  template <typename What>
-  void each_near(int cell, int reach, const What& what) const;
 
   Grid grid_;
   StandingLooks looks_;

@@ -18,6 +18,15 @@ void set_bits(size_t first, size_t end, uint8_t* bits) {
 
 }  // namespace
 
+void set_cell(const Grid& grid, int cell, uint8_t* bits) {
+  const int row = cell / grid.cols, col = cell % grid.cols;
+  for (int y = grid.top(row); y < grid.top(row + 1); ++y) {
+    const size_t line = static_cast<size_t>(y) * static_cast<size_t>(grid.width);
+    set_bits(line + static_cast<size_t>(grid.left(col)),
+             line + static_cast<size_t>(grid.left(col + 1)), bits);
+  }
+}
+
 void SolveHistory::begin() {
   const size_t cells = context_.grid.cells();
   absorbed_ = uncovered_ = HistoryStarts(cells);
@@ -66,15 +75,8 @@ FirstLooks SolveHistory::first_looks(const std::vector<int64_t>& numbers, bool e
 }
 
 void SolveHistory::take_out(int64_t number, uint8_t* bits) const {
-  for (const KnownForeground& known : known_foreground_) {
-    if (number < known.first || number > known.last) continue;
-    const int row = known.cell / context_.grid.cols, col = known.cell % context_.grid.cols;
-    for (int y = context_.grid.top(row); y < context_.grid.top(row + 1); ++y) {
-      const size_t line = static_cast<size_t>(y) * static_cast<size_t>(context_.grid.width);
-      set_bits(line + static_cast<size_t>(context_.grid.left(col)),
-               line + static_cast<size_t>(context_.grid.left(col + 1)), bits);
-    }
-  }
+  for (const KnownForeground& known : known_foreground_)
+    if (number >= known.first && number <= known.last) set_cell(context_.grid, known.cell, bits);
 }
 
 }  // namespace qdmd

@@ -10,6 +10,9 @@
 
 namespace qdmd {
 
+// Sets the bits of a cell's pixels. bits: of all pixels, in rows.
+void set_cell(const Grid& grid, int cell, uint8_t* bits);
+
 // A copy of what is known when a solve begins: frames that come beside it change nothing of it.
 class SolveHistory {
  public:

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "core/learn/robust/clutter.h"
-#include "core/learn/robust/contour.h"
+#include "core/learn/robust/compare_contours.h"
 #include "core/learn/robust/learning_steps.h"
 #include "core/passes/patch_density.h"
 
@@ -14,74 +14,6 @@ namespace qdmd {
 namespace {
 
 using namespace steps::start;
-
-// differs[cell]: differs_at(), but for cells that keep what they have. Without branches: the
-// compiler makes vectors of it.
-void find_differing(const float* const a[3], const float* const b[3], const uint8_t* keeps,
-                    size_t cells, uint8_t* __restrict differs) {
-  const float *a_0 = a[0], *a_1 = a[1], *a_2 = a[2], *b_0 = b[0], *b_1 = b[1], *b_2 = b[2];
-  const float most = kChannels * kLooksDiffer;
-  for (size_t cell = 0; cell < cells; ++cell) {
-    const float apart = std::abs(a_0[cell] - b_0[cell]) + std::abs(a_1[cell] - b_1[cell]) +
-                        std::abs(a_2[cell] - b_2[cell]);
-    differs[cell] = static_cast<uint8_t>(static_cast<int>(apart > most) & (keeps[cell] ^ 1));
-  }
-}
-
-// Frames propose themselves for the regions where they differ from the background: what has the
-// weaker contour there is the background. Something that stood still for most of the window ends at
-// a contour that the true background does not have. known: cells whose earlier background stays,
-// once they have it. counts(cell, look): false where a look says nothing.
-template <typename Counts>
-void compare_contours(const Grid& grid, const GridPictures& frames, int count,
-                      std::span<const float> density, std::span<const uint8_t> known,
-                      const Counts& counts, std::vector<int>* from) {
-  if (std::min(grid.rows, grid.cols) < 4 || count < 3) return;
-  const size_t cells = grid.cells();
-  GridPicture background(frames, *from);
-  const float* const b[3] = {background.plane(0), background.plane(1), background.plane(2)};
-  CellRegions regions(grid);
-  std::vector<uint8_t> differs(cells);
-  const int proposals = std::min(count, kProposals);
-  const int looks = static_cast<int>(density.size() / cells);
-  // The last look is the earlier background, if any cell is known.
-  std::vector<uint8_t> keeps(cells);
-  const auto note_kept = [&](size_t cell) {
-    if (!known[cell]) return;
-    const float* const e[3] = {frames.plane(count, 0), frames.plane(count, 1),
-                               frames.plane(count, 2)};
-    keeps[cell] = !differs_at(b, e, cell);
-  };
-  for (size_t cell = 0; cell < cells; ++cell) note_kept(cell);
-  for (int sweep = 0; sweep < 2; ++sweep) {
-    bool changed = false;
-    for (int i = 0; i < proposals + looks - count; ++i) {
-      const int t =
-          i < proposals ? static_cast<int>(int64_t{i} * count / proposals) : count + i - proposals;
-      const float* const f[3] = {frames.plane(t, 0), frames.plane(t, 1), frames.plane(t, 2)};
-      find_differing(f, b, keeps.data(), cells, differs.data());
-      const auto& found = regions.find(differs);
-      for (size_t region = 0; region < found.size(); ++region) {
-        const std::vector<int>& inside = found[region];
-        if (inside.size() < kLeastRegion) continue;
-        double support = 0;
-        for (int cell : inside)
-          support += density[static_cast<size_t>(t) * cells + static_cast<size_t>(cell)];
-        support /= static_cast<double>(inside.size());
-        if (support < std::max(kLeastAlike, kLeastSupport * static_cast<double>(count))) continue;
-        if (!Contour(grid, regions, static_cast<int>(region), inside).is_weaker(f, b)) continue;
-        for (int cell : inside) {
-          if (!counts(static_cast<size_t>(cell), t)) continue;
-          (*from)[static_cast<size_t>(cell)] = t;
-          background.take(frames, t, static_cast<size_t>(cell));
-          note_kept(static_cast<size_t>(cell));
-        }
-        changed = true;
-      }
-    }
-    if (!changed) return;
-  }
-}
 
 // Adds the recollection's look to the density of `count` frames. False, and nothing is added, where
 // too little of it is seen in any new frame.
@@ -226,7 +158,10 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
     if (keeps) from[cell] = count;
     known[cell] = keeps || earlier->share[cell] >= kKnown;
   }
-  compare_contours(grid, frames, count, density, known, counts, &from);
+  const std::vector<int> most_shown = from;
+  compare_contours(grid, {frames, count, density, known, counts}, &from);
+  for (size_t cell = 0; cell < cells; ++cell)
+    if (from[cell] != most_shown[cell]) result.by_contour.push_back(static_cast<int>(cell));
 
   make_room(&room->distance, cells * static_cast<size_t>(looks));
   const uint16_t* const distance = room->distance.data();

@@ -73,12 +73,14 @@ class FrameLists {
 struct StableFrames {
   FrameLists of_cell;
   std::vector<float> limit;
+  // Cells where contours say that most frames show something that stands before the background.
+  std::vector<int> by_contour;
   // Too little of what was known before is seen again: the camera moved, or the scene is another.
   bool another_scene = false;
 
   // Where `looks` frames are compared.
   static uint64_t bytes(const Grid& grid, uint64_t looks) {
-    return FrameLists::bytes(grid.cells(), looks) + grid.cells() * sizeof(float);
+    return FrameLists::bytes(grid.cells(), looks) + grid.cells() * (sizeof(float) + sizeof(int));
   }
 };
 

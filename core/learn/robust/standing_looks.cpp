@@ -7,6 +7,7 @@
 
 #include "core/learn/robust/in_blocks.h"
 #include "core/learn/robust/learning_steps.h"
+#include "core/learn/robust/near_cells.h"
 #include "core/learn/robust/places.h"
 
 namespace qdmd {
@@ -258,16 +259,11 @@ const std::vector<int>& StandingLooks::stood(const float* const background[3], i
     const auto ripe_cells = std::count_if(
         region.begin(), region.end(), [&](int cell) { return ripe(static_cast<size_t>(cell)); });
     if (2 * static_cast<size_t>(ripe_cells) < region.size()) continue;
-    for (int cell : region) {
-      const int y = cell / grid_.cols, x = cell % grid_.cols;
-      for (int yy = std::max(0, y - 1); yy <= std::min(grid_.rows - 1, y + 1); ++yy)
-        for (int xx = std::max(0, x - 1); xx <= std::min(grid_.cols - 1, x + 1); ++xx) {
-          const int near = yy * grid_.cols + xx;
-          if (near == cell ||
-              (!differs_[static_cast<size_t>(near)] && shows(static_cast<size_t>(near))))
-            found_.push_back(near);
-        }
-    }
+    for (int cell : region)
+      each_near(grid_, cell, 1, [&](int near) {
+        const auto at = static_cast<size_t>(near);
+        if (near == cell || (!differs_[at] && shows(at))) found_.push_back(near);
+      });
   }
   std::sort(found_.begin(), found_.end());
   found_.erase(std::unique(found_.begin(), found_.end()), found_.end());

@@ -136,8 +136,24 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
     find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
+    take_out_rejected(t, bits);
     if (clips_) fill_ends(t, bits);
   });
+}
+
+// Takes out what a contour says stands before the background, however little it differs.
+void WindowSolve::take_out_rejected(int snapshot, uint8_t* bits) const {
+  if (compared_.empty()) return;
+  // The compared snapshot that is nearest in time.
+  auto at = std::lower_bound(compared_.begin(), compared_.end(), snapshot);
+  if (at == compared_.end() || (at != compared_.begin() && snapshot - at[-1] < *at - snapshot))
+    --at;
+  const auto look =
+      static_cast<uint16_t>(start_frames_ - std::ssize(compared_) + (at - compared_.begin()));
+  for (const int cell : stable_.by_contour) {
+    const auto shown = stable_.of_cell[static_cast<size_t>(cell)];
+    if (!std::binary_search(shown.begin(), shown.end(), look)) set_cell(context_.grid, cell, bits);
+  }
 }
 
 // Takes out what the background would show at the end of the samples' range: such a sample says

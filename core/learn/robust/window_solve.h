@@ -109,6 +109,7 @@ class WindowSolve {
   void refine_gains(const SnapshotRange& snapshots, const std::vector<int>& frames,
                     std::vector<Gain>* gains);
   void find_foreground(const SolveHistory& history);
+  void take_out_rejected(int snapshot, uint8_t* bits) const;
   Decomposition decompose_filled();
   template <typename Sample>
   void combine(BackgroundModel* model);
@@ -125,6 +126,7 @@ class WindowSolve {
   const RobustContext& context_;
   std::optional<Span> window_;
   int start_frames_ = 0;
+  std::vector<int> compared_;  // the snapshots of them, in order
   StableFrames stable_;
   StableFramesRoom stable_room_;
   ReferencePicture reference_;

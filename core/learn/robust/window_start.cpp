@@ -226,6 +226,7 @@ void WindowSolve::start(const Known& known) {
     return;
   }
   start_frames_ = looks.count;
+  compared_ = looks.snapshots;
   if (clips_) prefer_darker(looks, chosen);
   take_background(looks, *known.earlier);
 }
