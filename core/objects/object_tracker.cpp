@@ -197,7 +197,8 @@ void ObjectTracker::measure_together(const std::vector<size_t>& tracks, const Ob
     Track& track = tracks_[t];
     // What stands is where it was.
     if (track.life.standing_since() == kNoTime) {
-      track.motion.go_on(seconds);
+      // Nobody knows how far it went while frames were missing.
+      track.motion.go_on(std::min(seconds, kGoesOn));
       const auto off = [](bool low, double by_low, bool high, double by_high) {
         return low && high ? (by_low + by_high) / 2 : low ? by_low : high ? by_high : 0;
       };

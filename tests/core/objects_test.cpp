@@ -151,6 +151,30 @@ TEST_F(Tracking, TwoThatPassEachOtherKeepTheirs) {
   EXPECT_EQ(0, count(Kind::gone));
 }
 
+// Half a minute is missing while they meet: they are where their region is.
+TEST_F(Tracking, MissingFramesMoveNobodyOutOfThePicture) {
+  for (int t = 0; t < 35; ++t) {
+    const double a = 20 + 3 * t, b = 270 - 3 * t;
+    if (b - a > 30)
+      push({region(a, 100, 30, 80), region(b, 104, 30, 80)});
+    else
+      push({region(a, 100, b - a + 30, 84)});
+  }
+  EXPECT_EQ(2, count(Kind::appeared));
+  push({region(125, 100, 60, 84)});
+  ASSERT_EQ(2u, tracker_.objects().size());
+  time_ += 750 * kStep;
+  push({region(125, 100, 60, 84)});
+  for (const Object& object : tracker_.objects()) {
+    EXPECT_GT(object.box.width, 10);
+    EXPECT_NEAR(155, object.box.middle_x(), 40);
+  }
+  for (const ObjectEvent& event : tracker_.end()) {
+    if (event.kind != Kind::gone) continue;
+    EXPECT_NEAR(155, event.object.box.middle_x(), 40);
+  }
+}
+
 TEST_F(Tracking, OneThatWalksBehindOneThatStandsKeepsItsNumber) {
   int stander = 0, walker = 0;
   for (int t = 0; t < 160; ++t) {
