@@ -41,11 +41,11 @@ inline RegionContours weaker() { return contours(kMuchLess, kStrong); }
 // A floor, and what lies before it; the memory sees all of it.
 class Stage {
  public:
-  explicit Stage(int64_t young_frames = 0) : memory(grid, young_frames) {
+  explicit Stage(bool live = false) : memory(grid, live) {
     for (std::vector<float>* planes : {&background, &shown})
       planes->assign(kChannels * grid.cells(), kFloor);
     // Enough frames have shown the floor.
-    if (young_frames == 0) memory.grow_up();
+    if (!live) memory.grow_up();
   }
 
   // What is seen, or known, at a place from now on.

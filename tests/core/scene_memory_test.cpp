@@ -163,6 +163,25 @@ TEST(SceneMemory, WhatGoesOnIsNoProofAgainstTheContour) {
   EXPECT_GT(stage.frames_until_found(200), 200);
 }
 
+// A tenth of the cells around it does not settle. Frames that wait can wait for that.
+TEST(SceneMemory, FramesThatWaitLetMoreSettle) {
+  for (bool live : {false, true}) {
+    Stage stage(live);
+    stage.memory.grow_up();
+    stage.say(stronger());
+    stage.bag_leaves();
+    stage.passes([](int row, int col) {
+      return row == kPlace.top - 2 && col >= kPlace.left && col < kPlace.left + kPlace.cols;
+    });
+    const int found = stage.frames_until_found(30);
+    EXPECT_EQ(found, live ? kSteady : 31);
+    stage.nothing_passes();
+    if (!live) {
+      EXPECT_LT(stage.frames_until_found(20), 20);
+    }
+  }
+}
+
 // ---- Nothing settles ----
 
 TEST(SceneMemory, WhileThingsPassBesideItNothingIsSaid) {

@@ -114,9 +114,9 @@ TEST(SceneMemory, WhatChangesAllOverAtDifferentTimesDoesNot) {
 // ---- Young scenes ----
 
 TEST(SceneMemory, YoungScenesAreJudgedByTheContoursOfCells) {
-  constexpr int kYoung = 100;
+  constexpr int kYoung = 200;
   for (bool leaves : {false, true}) {
-    Stage stage(kYoung);
+    Stage stage(true);
     // Full resolution would say the contrary.
     stage.say(leaves ? weaker() : clear());
     if (leaves)
@@ -133,7 +133,7 @@ TEST(SceneMemory, YoungScenesAreJudgedByTheContoursOfCells) {
     EXPECT_FALSE(proofs.any);
   }
   // Full resolution decides from then on.
-  Stage stage(kYoung);
+  Stage stage(true);
   stage.say(weaker());
   stage.frames(kYoung - 1);
   EXPECT_TRUE(stage.memory.young());
@@ -280,9 +280,9 @@ TEST(SceneMemory, ForgetsWhatItKnewAtOnce) {
 }
 
 TEST(SceneMemory, ForgetsAll) {
-  constexpr int kYoung = 30;
+  constexpr int kYoung = 200;
   const Rect elsewhere = {2, 22, 8, 8};
-  Stage stage(kYoung);
+  Stage stage(true);
   stage.frames(kYoung);
   stage.say(clear());
   stage.bag_leaves();
@@ -312,7 +312,7 @@ TEST(SceneMemory, ForgetsAll) {
 TEST(SceneMemory, PicturesOfFewCellsSayNothing) {
   for (const auto& [rows, cols] : {std::pair{1, 1}, {3, 40}, {40, 3}}) {
     const Grid grid = grid_of(rows, cols);
-    SceneMemory memory(grid, 0);
+    SceneMemory memory(grid, false);
     std::vector<float> floor(kChannels * grid.cells(), kFloor), bag(kChannels * grid.cells(), kBag);
     const auto of = [&](const std::vector<float>& planes) {
       return std::array<const float*, 3>{planes.data(), planes.data() + grid.cells(),
@@ -331,7 +331,7 @@ TEST(SceneMemory, PicturesOfFewCellsSayNothing) {
 // Frames in other light are the same scene.
 TEST(SceneMemory, FramesAreInTheLightThatTheyAreGiven) {
   const Grid grid = grid_of(kRows, kCols);
-  SceneMemory memory(grid, 0);
+  SceneMemory memory(grid, false);
   const std::vector<float> floor(kChannels * grid.cells(), kFloor);
   const float* const known[3] = {floor.data(), floor.data(), floor.data()};
   for (int t = 0; t < 100; ++t) {

@@ -22,8 +22,7 @@ void FrameFollower::begin() {
   unclipped_ = GridFrames(grid, 1);
   light_ = LightOfFrames(grid.cells());
   // Frames that wait can wait for a proof.
-  if (context_.follows(models))
-    memory_ = SceneMemory(grid, models == Models::two_of_live ? steps::proofs::kYoungFrames : 0);
+  if (context_.follows(models)) memory_ = SceneMemory(grid, models == Models::two_of_live);
   if (models != Models::two_of_live) looks_ = StandingLooks(grid);
   absorbed_ = HistoryStarts(grid.cells());
   scene_ = SceneWatch(grid);

@@ -173,9 +173,10 @@ QDMD_STEP int64_t kPieces = step("proofs.pieces", int64_t{250});
 // Cells around a region in which that is seen, without those next to it.
 QDMD_STEP int kAround = step("proofs.around", 6);
 // Cells next to a region; what leaves is no longer there once something passes before less than
-// this share of them.
+// this share of them. Frames that wait can wait for that for longer; in mode=live each is shown.
 QDMD_STEP int kNear = step("proofs.near", 2);
-QDMD_STEP double kSettled = step("proofs.settled", 0.2);
+QDMD_STEP double kSettled = step("proofs.settled", 0.05);
+QDMD_STEP double kSettledOfLive = step("proofs.settled_of_live", 0.2);
 // Contours are compared as (a - b) / (a + b): the background's must be so much stronger, where
 // motion says nothing and the region has settled; and where it does not settle. Motion counts half
 // as much.

@@ -26,7 +26,7 @@ int64_t at_share(std::vector<int64_t>* of, double share) {
 
 }  // namespace
 
-SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
+SceneMemory::SceneMemory(const Grid& grid, bool live)
     : grid_(grid),
       looks_(grid),
       uncovered_(grid.cells()),
@@ -35,7 +35,8 @@ SceneMemory::SceneMemory(const Grid& grid, int64_t young_frames)
       differs_(grid.cells()),
       unjudged_(grid.cells()),
       marks_(grid.cells()),
-      young_frames_(young_frames) {
+      young_frames_(live ? kYoungFrames : 0),
+      settled_(live ? kSettledOfLive : kSettled) {
   found_.reserve(grid.cells());
   around_.reserve(grid.cells());
   differing_.reserve(grid.cells());
@@ -178,7 +179,7 @@ bool SceneMemory::has_left(const std::vector<int>& region, const Change& change,
   const double both =
       stronger + (change.known ? kOfMotion * balance(motion.after, motion.before, 0.1) : 0);
   // What comes beside what stands there is mostly a part of it.
-  if (motion.near < kSettled) return both > (came_beside(region) ? kMuchStronger : kStronger);
+  if (motion.near < settled_) return both > (came_beside(region) ? kMuchStronger : kStronger);
   const bool is_clear = region.size() >= kClearRegion && stronger > kClear && both > kClearBoth;
   return stronger > kMuchStronger && both > kMuchStronger &&
          (looks_.newest() - change.until >= 2 * kMoves || is_clear);

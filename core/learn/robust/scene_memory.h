@@ -55,8 +55,9 @@ struct Proofs {
 class SceneMemory {
  public:
   SceneMemory() = default;
-  // Takes all memory but what judge() needs for a moment. young_frames: see young().
-  SceneMemory(const Grid& grid, int64_t young_frames);
+  // Takes all memory but what judge() needs for a moment. live: frames are not waiting for what is
+  // said of them.
+  SceneMemory(const Grid& grid, bool live);
   static uint64_t bytes(const Grid& grid);
 
   // Nothing is known.
@@ -134,6 +135,7 @@ class SceneMemory {
   std::vector<int> found_, around_, differing_;
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;
+  double settled_ = 0;  // kSettled, or that of live
 };
 
 }  // namespace qdmd
