@@ -40,9 +40,9 @@ void Background::forget() {
   state_ = State::learnt;
 }
 
-void Background::begin_scene(bool returns) {
+void Background::begin_scene(bool returns, bool in_other_colours) {
   learner_->begin_scene(returns);
-  scene_begins_ = true;
+  scene_begins_ = !in_other_colours;
   scene_returns_ = returns;
 }
 
@@ -52,12 +52,12 @@ void Background::begin_scene_at_once() {
   state_ = State::learnt;
 }
 
-void Background::return_to(const Learnt& learnt) {
+void Background::return_to(const Learnt& learnt, bool in_other_colours) {
   begin_scene(true);
   make_room();
   recall(learnt);
   show(learnt, State::held_in_light);
-  decision_.change_scene(true);
+  if (!in_other_colours) decision_.change_scene(true);
   scene_begins_ = false;
 }
 

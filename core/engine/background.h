@@ -32,13 +32,14 @@ class Background {
   Learner& learner() { return *learner_; }
   // Forgets the model and what earlier windows showed.
   void forget();
-  // Learner::begin_scene(); masks do so with the next publish().
-  void begin_scene(bool returns);
+  // Learner::begin_scene(); masks do so with the next publish(). in_other_colours: the camera shows
+  // the same places, and masks go on with what they know of them.
+  void begin_scene(bool returns, bool in_other_colours = false);
   // As begin_scene() of a scene that nobody knows, and there is no background until that publish().
   void begin_scene_at_once();
-  // The camera shows the scene of `learnt` again: its background is in use, in the light of each
-  // frame. If it throws, nothing is known.
-  void return_to(const Learnt& learnt);
+  // The camera shows the scene of `learnt` again, or this one in the colours of `learnt`: its
+  // background is in use, in the light of each frame. If it throws, nothing is known.
+  void return_to(const Learnt& learnt, bool in_other_colours);
 
   // Writes all that is known into `learnt`, with L at the time and light that the model is set to.
   void remember(Learnt* learnt) const;

@@ -59,12 +59,13 @@ void BatchSchedule::follow_scene() {
       return;
     case SceneSeen::another:
       window.scene = std::max(window.begin, taken() - Learner::kSceneFrames);
-      window.scene_returns = false;
+      window.scene_returns = window.other_colours = false;
       return;
     case SceneSeen::other_colours:
     case SceneSeen::earlier_colours:
       if (!window.scene) window.scene = std::max(window.begin, taken() - steps::colour::kFrames);
       window.scene_returns = seen == SceneSeen::earlier_colours;
+      window.other_colours = true;
       return;
     case SceneSeen::the_one_before:
       // Something disturbed the picture for a moment.
@@ -73,6 +74,7 @@ void BatchSchedule::follow_scene() {
       else if (!window.scene)
         window.scene = std::max(window.begin, taken() - steps::scene::kReturn);
       window.scene_returns = true;
+      window.other_colours = false;
       return;
   }
 }
@@ -183,7 +185,7 @@ void BatchSchedule::solve_at_once() {
 // Frames before it leave with the background before; what comes after knows nothing of them.
 void BatchSchedule::begin_scene(const Collection& window) {
   wait();
-  background().begin_scene(window.scene_returns);
+  background().begin_scene(window.scene_returns, window.other_colours);
   history_from_ = *window.scene;
   if (shown_.end != window.begin) return;
   shown_.hold_from = window.begin;

@@ -52,6 +52,7 @@ class BatchSchedule : public Schedule {
     int not_added = 0;                  // newest frames whose inner products are not computed yet
     std::optional<int64_t> scene = {};  // the first frame of another scene
     bool scene_returns = false;         // which was left before
+    bool other_colours = false;         // of the same places
   };
   // Shown by the first window from frame `from` on, if that one is held.
   struct Loaded {

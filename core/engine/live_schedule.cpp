@@ -61,7 +61,7 @@ void LiveSchedule::follow_scene() {
   const bool goes_on =
       seen == SceneSeen::other_colours && background().learner().recolour(&recoloured);
   if (returns || goes_on)
-    background().return_to(goes_on ? recoloured : *left_);
+    background().return_to(goes_on ? recoloured : *left_, seen != SceneSeen::the_one_before);
   else
     background().begin_scene_at_once();
   left_ = std::move(before);
