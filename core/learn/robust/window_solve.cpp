@@ -136,7 +136,8 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
     find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
-    take_out_rejected(t, bits);
+    // Lists leave out frames that clip, though they show it.
+    if (!clips_) take_out_rejected(t, bits);
     if (clips_) fill_ends(t, bits);
   });
 }
