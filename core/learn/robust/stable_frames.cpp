@@ -87,6 +87,30 @@ void leave_clutter_out(const Grid& grid, const GridPictures& frames, int count,
   }
 }
 
+// How far two frames are from each other at a cell: levels, sum of the channels.
+float apart(const GridPictures& frames, int a, int b, size_t cell) {
+  float sum = 0;
+  for (int c = 0; c < kChannels; ++c)
+    sum += std::abs(frames.plane(a, c)[cell] - frames.plane(b, c)[cell]);
+  return sum;
+}
+
+// Where contours chose another look than the one that most frames show.
+void note_rejected(const GridPictures& frames, int looks, std::span<const int> most_shown,
+                   std::span<const int> from, StableFrames* stable) {
+  stable->rejected = Rejected(static_cast<size_t>(looks));
+  const float most = kChannels * steps::contours::kLooksDiffer;
+  for (size_t cell = 0; cell < from.size(); ++cell) {
+    if (apart(frames, from[cell], most_shown[cell], cell) <= most) continue;
+    const auto shown = stable->of_cell[cell];
+    stable->rejected.add(static_cast<int>(cell), static_cast<size_t>(looks), [&](size_t t) {
+      const auto at = static_cast<int>(t);
+      return !std::binary_search(shown.begin(), shown.end(), static_cast<uint16_t>(t)) &&
+             apart(frames, at, most_shown[cell], cell) < apart(frames, at, from[cell], cell);
+    });
+  }
+}
+
 // The bytes of the room's steps.
 uint64_t steps_bytes(const Grid& grid, uint64_t looks) {
   return sizeof(uint16_t) *
@@ -160,8 +184,6 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
   }
   const std::vector<int> most_shown = from;
   compare_contours(grid, {frames, count, density, known, counts}, &from);
-  for (size_t cell = 0; cell < cells; ++cell)
-    if (from[cell] != most_shown[cell]) result.by_contour.push_back(static_cast<int>(cell));
 
   make_room(&room->distance, cells * static_cast<size_t>(looks));
   const uint16_t* const distance = room->distance.data();
@@ -197,6 +219,7 @@ StableFrames find_stable_frames(const Grid& grid, const GridPictures& frames, in
       if (result.of_cell[cell].empty()) result.of_cell.add(cell, from[cell]);
     }
   });
+  note_rejected(frames, looks, most_shown, from, &result);
   return result;
 }
 

@@ -68,19 +68,52 @@ class FrameLists {
   std::vector<uint16_t> counts_, chosen_, frames_;
 };
 
+// Frames of cells where contours say that most frames show something else than the background, and
+// it differs from it by more than light does (contours.looks_differ).
+class Rejected {
+ public:
+  Rejected() = default;
+  // Of `looks` frames.
+  explicit Rejected(size_t looks) : each_((looks + 7) / 8) {}
+  static uint64_t bytes(uint64_t cells, uint64_t looks) {
+    return cells * (sizeof(int) + (looks + 7) / 8);
+  }
+
+  // In the grid's order.
+  const std::vector<int>& cells() const { return cells_; }
+  // The at-th of these cells shows in frame `look` what was rejected.
+  bool shows(size_t at, size_t look) const {
+    return ((bits_[at * each_ + look / 8] >> (look % 8)) & 1) != 0;
+  }
+  // Adds a cell and its frames, those with shows(look).
+  template <typename Shows>
+  void add(int cell, size_t looks, Shows shows) {
+    cells_.push_back(cell);
+    bits_.resize(bits_.size() + each_);
+    uint8_t* const bits = bits_.data() + bits_.size() - each_;
+    for (size_t t = 0; t < looks; ++t)
+      bits[t / 8] = static_cast<uint8_t>(bits[t / 8] | (shows(t) ? 1 : 0) << (t % 8));
+  }
+
+ private:
+  size_t each_ = 0;
+  std::vector<int> cells_;
+  std::vector<uint8_t> bits_;
+};
+
 // For each cell the frames that show its background, in time order, and the patches' distance from
 // it up to which they do.
 struct StableFrames {
   FrameLists of_cell;
   std::vector<float> limit;
-  // Cells where contours say that most frames show something that stands before the background.
-  std::vector<int> by_contour;
+  Rejected rejected;
   // Too little of what was known before is seen again: the camera moved, or the scene is another.
   bool another_scene = false;
 
   // Where `looks` frames are compared.
   static uint64_t bytes(const Grid& grid, uint64_t looks) {
-    return FrameLists::bytes(grid.cells(), looks) + grid.cells() * (sizeof(float) + sizeof(int));
+    return FrameLists::bytes(grid.cells(), looks) + Rejected::bytes(grid.cells(), looks) +
+           grid.cells() * sizeof(float);
   }
 };
 

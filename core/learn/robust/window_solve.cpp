@@ -136,7 +136,7 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
     find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
-    // Lists leave out frames that clip, though they show it.
+    // What clips differs from what shows it all, and is the same.
     if (!clips_) take_out_rejected(t, bits);
     if (clips_) fill_ends(t, bits);
   });
@@ -150,11 +150,10 @@ void WindowSolve::take_out_rejected(int snapshot, uint8_t* bits) const {
   if (at == compared_.end() || (at != compared_.begin() && snapshot - at[-1] < *at - snapshot))
     --at;
   const auto look =
-      static_cast<uint16_t>(start_frames_ - std::ssize(compared_) + (at - compared_.begin()));
-  for (const int cell : stable_.by_contour) {
-    const auto shown = stable_.of_cell[static_cast<size_t>(cell)];
-    if (!std::binary_search(shown.begin(), shown.end(), look)) set_cell(context_.grid, cell, bits);
-  }
+      static_cast<size_t>(start_frames_ - std::ssize(compared_) + (at - compared_.begin()));
+  const Rejected& rejected = stable_.rejected;
+  for (size_t i = 0; i < rejected.cells().size(); ++i)
+    if (rejected.shows(i, look)) set_cell(context_.grid, rejected.cells()[i], bits);
 }
 
 // Takes out what the background would show at the end of the samples' range: such a sample says
