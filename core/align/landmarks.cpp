@@ -44,6 +44,19 @@ float smoothed(const uint8_t* at, ptrdiff_t stride, float u, float v) {
   return sum / 16;
 }
 
+// Samples from here on may be at the end of their range, in any format.
+constexpr uint8_t kEnd = 235;
+
+// True where one of `rows` x `rows` samples is at the end of their range; `at` is the second of the
+// second row.
+bool has_end(const uint8_t* at, ptrdiff_t stride, int rows) {
+  const uint8_t* row = at - stride - 1;
+  uint8_t most = 0;
+  for (int y = 0; y < rows; ++y, row += stride)
+    for (int x = 0; x < rows; ++x) most = std::max(most, row[x]);
+  return most >= kEnd;
+}
+
 // Pixels of a row that are looked at together.
 constexpr int kTogether = 64;
 
@@ -82,10 +95,11 @@ Landmarks::Landmarks(int most)
       level_(x_.size()),
       right_(x_.size()),
       down_(x_.size()),
+      at_end_(x_.size()),
       residual_(x_.size()) {}
 
 uint64_t Landmarks::bytes(int most) {
-  return static_cast<uint64_t>(most) * (2 * sizeof(int32_t) + 4 * sizeof(float));
+  return static_cast<uint64_t>(most) * (2 * sizeof(int32_t) + 4 * sizeof(float) + 1);
 }
 
 void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int ignored_scale) {
@@ -112,6 +126,7 @@ void Landmarks::choose(const GreyView& picture, const IgnoredAreas& ignored, int
       x_[i] = static_cast<int32_t>(best.x);
       y_[i] = static_cast<int32_t>(best.y);
       level_[i] = smoothed(at, stride);
+      at_end_[i] = has_end(at, stride, 3);
       right_[i] = (smoothed(at + 1, stride) - smoothed(at - 1, stride)) / 2;
       down_[i] = (smoothed(at + stride, stride) - smoothed(at - stride, stride)) / 2;
     }
@@ -132,9 +147,13 @@ void Landmarks::read(const GreyView& frame, const Pose& pose, const GreyLight& l
   const auto lit = [&](size_t i) { return gain * (level_[i] - 128) + 128 + offset; };
   const auto count = static_cast<size_t>(count_);
   const ptrdiff_t stride = frame.width;
+  const bool other_light = light.changed();
   if (pose.is_rest()) {
-    for (size_t i = 0; i < count; ++i)
-      residual_[i] = smoothed(frame.samples + y_[i] * stride + x_[i], stride) - lit(i);
+    for (size_t i = 0; i < count; ++i) {
+      const uint8_t* const at = frame.samples + y_[i] * stride + x_[i];
+      const bool unknown = other_light && (at_end_[i] != 0 || has_end(at, stride, 3));
+      residual_[i] = unknown ? kOutside : smoothed(at, stride) - lit(i);
+    }
     return;
   }
   const Affine to_frame = affine(inverse(pose), middle_of(width_, height_));
@@ -152,7 +171,9 @@ void Landmarks::read(const GreyView& frame, const Pose& pose, const GreyLight& l
     }
     const auto left = static_cast<int>(x), top = static_cast<int>(y);
     const float u = x - static_cast<float>(left), v = y - static_cast<float>(top);
-    residual_[i] = smoothed(frame.samples + top * stride + left, stride, u, v) - lit(i);
+    const uint8_t* const at = frame.samples + top * stride + left;
+    const bool unknown = other_light && (at_end_[i] != 0 || has_end(at, stride, 4));
+    residual_[i] = unknown ? kOutside : smoothed(at, stride, u, v) - lit(i);
   }
 }
 
@@ -270,14 +291,16 @@ double Landmarks::share_within(const GreyView& frame, int x, int y, const GreyLi
                                double limit) const {
   const auto gain = static_cast<float>(1 + light.gain), offset = static_cast<float>(light.offset);
   const auto most = static_cast<float>(limit);
+  const bool other_light = light.changed();
   const ptrdiff_t stride = frame.width;
   int inside = 0, within = 0;
   for (size_t i = 0; i < static_cast<size_t>(count_); ++i) {
     const int at_x = x_[i] - x, at_y = y_[i] - y;
     if (at_x < 1 || at_y < 1 || at_x > frame.width - 2 || at_y > frame.height - 2) continue;
+    const uint8_t* const at = frame.samples + at_y * stride + at_x;
+    if (other_light && (at_end_[i] != 0 || has_end(at, stride, 3))) continue;
     ++inside;
-    const float e = smoothed(frame.samples + at_y * stride + at_x, stride) -
-                    (gain * (level_[i] - 128) + 128 + offset);
+    const float e = smoothed(at, stride) - (gain * (level_[i] - 128) + 128 + offset);
     within += std::abs(e) < most ? 1 : 0;
   }
   return inside >= std::max(kFewest, count_ / 4) ? static_cast<double>(within) / inside : 0;

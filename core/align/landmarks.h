@@ -2,6 +2,7 @@
 // Pixels of a picture by which its place is found in other pictures.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct GreyView {
 // offset, where `level` is a level of the landmarks' own picture.
 struct GreyLight {
   double gain = 0, offset = 0;
+  // So much that samples at the end of their range show other edges.
+  bool changed() const { return std::abs(gain) > 0.03 || std::abs(offset) > 4; }
 };
 
 // How a frame fits at a pose.
@@ -69,7 +72,9 @@ class Landmarks {
   int most_, count_ = 0, width_ = 0, height_ = 0;
   std::vector<int32_t> x_, y_;
   std::vector<float> level_, right_, down_;  // levels, and their slopes a pixel
-  // Residuals of the frame that is compared, those outside of it far away.
+  std::vector<uint8_t> at_end_;  // 1 where samples around it may be at the end of their range
+  // Residuals of the frame that is compared, those that say nothing far away: outside of it, and
+  // at the end of samples' range in another light.
   std::vector<float> residual_;
 };
 

@@ -260,6 +260,46 @@ TEST(ColourMaps, InfraRedIsFoundBehindPeople) {
   EXPECT_NEAR(find_colour_map(now, before, kCells)->of({50, 80, 110})[1], 90, 1);
 }
 
+// White paving in the sun: most samples are at the end of their range, and have lost their colour.
+TEST(ColourMaps, WhatIsTooBrightSaysNothing) {
+  constexpr size_t kCells = 600;
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> level(10, 130);
+  std::vector<float> scene[3], frame[3];
+  for (size_t i = 0; i < kCells; ++i) {
+    const float paving = i < kCells / 2 ? 110 : 0;
+    for (size_t c = 0; c < 3; ++c) scene[c].push_back(paving + level(random));
+  }
+  for (auto& plane : frame) plane.resize(kCells);
+  const float* const before[3] = {scene[0].data(), scene[1].data(), scene[2].data()};
+  const float* const now[3] = {frame[0].data(), frame[1].data(), frame[2].data()};
+  // Twice as bright it is as coloured as it was.
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < kCells; ++i) frame[c][i] = std::min(255.0f, 2 * scene[c][i]);
+  EXPECT_EQ(colouring_of(now, before, kCells), Colouring::some);
+  EXPECT_EQ(colouring_of(before, now, kCells), Colouring::some);
+  // All white: nobody knows.
+  for (size_t c = 0; c < 3; ++c) std::fill(frame[c].begin(), frame[c].end(), 255.0f);
+  EXPECT_EQ(colouring_of(now, before, kCells), Colouring::little);
+  // Without colour, and so bright that a third is at the end: the map is that of the rest.
+  const float weight[3] = {0.5f, 0.9f, 0.2f};
+  size_t at_end = 0;
+  for (size_t i = 0; i < kCells; ++i) {
+    float luma = 0;
+    for (size_t c = 0; c < 3; ++c) luma += weight[c] * scene[c][i];
+    at_end += luma > 255;
+    for (size_t c = 0; c < 3; ++c) frame[c][i] = std::min(255.0f, luma);
+  }
+  EXPECT_GT(at_end, kCells / 4);
+  EXPECT_EQ(colouring_of(now, before, kCells), Colouring::none);
+  const auto map = find_colour_map(now, before, kCells);
+  ASSERT_TRUE(map);
+  for (const auto& row : map->row) {
+    for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(row[c], weight[c], 0.01);
+    EXPECT_NEAR(row[3], 0, 1);
+  }
+}
+
 // ---- The exposure of a camera that starts ----
 
 TEST(ExposureWatch, WaitsUntilTheLightRests) {

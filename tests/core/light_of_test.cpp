@@ -69,6 +69,27 @@ TEST(LightOf, ColoursOfLightAreFound) {
   expect_gains(light_of(lit_frames(grid, truth, 6, 9), 30).gains, truth);
 }
 
+// Where most of a channel is at the end of its range, the few cells that are left of it are not
+// taken for a colour of the light.
+TEST(LightOf, WhatIsTooBrightIsNoColour) {
+  const Grid grid = grid_of(20, 30);
+  std::mt19937 rng(5);
+  GridFrames frames = random_frames(grid, 1, 40, 150, rng);
+  GridFrames both(grid, 2);
+  for (int c = 0; c < kChannels; ++c)
+    for (size_t i = 0; i < grid.cells(); ++i) {
+      float level = frames.plane(0, c)[i];
+      // All of green but one cell in forty is bright; the light of these is a shade's.
+      const bool green = c == 1, shaded = green && i % 40 == 0;
+      if (green && !shaded) level += 100;
+      both.plane(0, c)[i] = std::min(255.0f, level);
+      both.plane(1, c)[i] = std::min(255.0f, (shaded ? 1.62f : 1.7f) * level);
+    }
+  LightScratch scratch(grid.cells());
+  const Gain gain = light_over(both, 1, both, 0, &scratch);
+  for (const float of_channel : gain) EXPECT_NEAR(of_channel, 1.7f, 0.017f);
+}
+
 // Frames near the middle light are left to refine_gain(): they agree with it within its tolerance.
 TEST(LightOf, AFadeIsFollowed) {
   const Grid grid = grid_of(20, 30);

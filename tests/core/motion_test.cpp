@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // How a camera moved, against the simulator's truth.
 #include <algorithm>
+#include <numbers>
 #include <random>
 #include <utility>
 
@@ -109,6 +110,29 @@ TEST(Motion, OfACameraThatStandsStillIsNone) {
         "background-motion", "illumination-changes", "dynamic-background", "basic,night",
         "basic,rain", "basic,snow", "basic,water"})
     EXPECT_EQ(track(text, 150, false).most, 0) << text;
+}
+
+// A camera in the sun: what is too bright grows and shrinks with the exposure, and nothing moves.
+TEST(Motion, IsNotThatOfTheExposure) {
+  for (const auto& [seed, mean] : {std::pair{1, 2.6}, {3, 2.6}, {4, 2.0}, {2, 4.0}}) {
+    Scene scene(options(kWidth, kHeight, 25, seed), "basic");
+    MotionFinder finder(kWidth, kHeight);
+    Pose before;
+    for (int t = 0; t < 300; ++t) {
+      scene.render(t, scene::kFrame);
+      std::vector<uint8_t> grey = grey_of(scene);
+      const double exposure =
+          mean * (1 + 0.25 * std::sin(2 * std::numbers::pi * static_cast<double>(t) / 100));
+      for (uint8_t& sample : grey)
+        sample = static_cast<uint8_t>(std::min(255.0, std::round(exposure * sample)));
+      if (t == 0) {
+        finder.take_reference(grey.data(), {});
+        continue;
+      }
+      before = finder.find(grey.data(), before, Pose(), false).pose;
+      EXPECT_TRUE(before.is_rest()) << seed << ", " << t << ": " << before.x << " " << before.y;
+    }
+  }
 }
 
 // A bus that fills half of the picture and drives on.

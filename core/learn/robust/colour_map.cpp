@@ -13,6 +13,12 @@ namespace {
 
 using namespace steps::colour;
 
+// Its samples may be at the end of their range, and say no more than "at least".
+bool is_at_end(const float* const picture[kChannels], size_t cell) {
+  return std::max({picture[0][cell], picture[1][cell], picture[2][cell]}) >=
+         steps::light::kMeasured;
+}
+
 uint8_t rounded(float level) {
   return static_cast<uint8_t>(std::clamp(level + 0.5f, 0.0f, 255.0f));
 }
@@ -56,6 +62,7 @@ std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
     Eigen::Matrix<double, 4, kChannels> product = Eigen::Matrix<double, 4, kChannels>::Zero();
     for (size_t cell = 0; cell < cells; ++cell) {
       if (away[cell] > limit) continue;
+      if (is_at_end(frame, cell) || is_at_end(background, cell)) continue;
       const Eigen::Vector4d from(static_cast<double>(background[0][cell]),
                                  static_cast<double>(background[1][cell]),
                                  static_cast<double>(background[2][cell]), 1);
@@ -73,7 +80,8 @@ std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
     for (size_t cell = 0; cell < cells; ++cell) {
       const auto expected = map.of({background[0][cell], background[1][cell], background[2][cell]});
       away[cell] = 0;
-      for (size_t c = 0; c < kChannels; ++c) away[cell] += std::abs(frame[c][cell] - expected[c]);
+      for (size_t c = 0; c < kChannels; ++c)
+        away[cell] += std::abs(frame[c][cell] - std::min(expected[c], 255.0f));
     }
     std::vector<float> sorted = away;
     const auto at = sorted.begin() + static_cast<ptrdiff_t>(kFits * static_cast<double>(cells));
@@ -84,14 +92,19 @@ std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
   return colours.converts() ? of_samples(map, colours) : map;
 }
 
-Colouring colouring_of(const float* const cells[kChannels], size_t count) {
+Colouring colouring_of(const float* const cells[kChannels], const float* const other[kChannels],
+                       size_t count) {
   constexpr size_t kEach = 5;  // of so many cells one says enough
   double colour = 0, level = 0;
+  size_t seen = 0;
   for (size_t cell = 0; cell < count; cell += kEach) {
     const float a = cells[0][cell], b = cells[1][cell], c = cells[2][cell];
+    if (is_at_end(cells, cell) || is_at_end(other, cell)) continue;
     colour += static_cast<double>(std::max({a, b, c}) - std::min({a, b, c}));
     level += static_cast<double>((a + b + c) / 3);
+    ++seen;
   }
+  if (seen < steps::light::kLeastRatios) return Colouring::little;
   if (colour < kNone * level) return Colouring::none;
   return colour > kSome * level ? Colouring::some : Colouring::little;
 }

@@ -122,7 +122,8 @@ SceneSeen FrameFollower::colours_of(const Cells& frame) {
   const size_t cells = context_.grid.cells();
   const Cells background = this->background();
   if (context_.options.colours == Colours::grey) return SceneSeen::same;
-  const Colouring now = colouring_of(frame, cells), known = colouring_of(background, cells);
+  const Colouring now = colouring_of(frame, background, cells),
+                  known = colouring_of(background, frame, cells);
   const bool other = scene_.shows_background() && now != known && now != Colouring::little &&
                      known != Colouring::little;
   other_coloured_ = other ? other_coloured_ + 1 : 0;

@@ -92,7 +92,16 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
     // A channel that is dark everywhere: the light of the others.
     gain[c] = near.empty() ? std::exp(mode) : std::max(median(&near), kLeastGain);
   }
-  return gain;
+  if (!clips) return gain;
+  // Of some channels few cells are left: where no colour is clear, all channels say it together.
+  near.clear();
+  for (const auto& [ratio, cell] : ratios)
+    if (std::abs(ratio - mode) < kNear) near.push_back(std::exp(ratio));
+  const float all = std::max(median(&near), kLeastGain);
+  const bool tinted = std::any_of(gain.begin(), gain.end(), [all](float of_channel) {
+    return kOfColour * std::abs(std::log(of_channel / all)) > kStill;
+  });
+  return tinted ? gain : Gain{all, all, all};
 }
 
 // The planes of one picture of cells.
