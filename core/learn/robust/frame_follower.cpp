@@ -22,7 +22,10 @@ void FrameFollower::begin() {
   unclipped_ = GridFrames(grid, 1);
   light_ = LightOfFrames(grid.cells());
   // Frames that wait can wait for a proof.
-  if (context_.follows(models)) memory_ = SceneMemory(grid, models == Models::two_of_live);
+  if (context_.follows(models)) {
+    memory_ = SceneMemory(grid, models == Models::two_of_live);
+    standing_.resize(grid.cells());
+  }
   if (models != Models::two_of_live) looks_ = StandingLooks(grid);
   absorbed_ = HistoryStarts(grid.cells());
   scene_ = SceneWatch(grid);
@@ -31,7 +34,7 @@ void FrameFollower::begin() {
 uint64_t FrameFollower::bytes(const RobustContext& context, Models models) {
   const Grid& grid = context.grid;
   return GridFrames::bytes(grid, 3) + LightOfFrames::bytes(grid.cells()) +
-         (context.follows(models) ? SceneMemory::bytes(grid) : 0) +
+         (context.follows(models) ? SceneMemory::bytes(grid) + grid.cells() : 0) +
          (models == Models::two_of_live ? 0 : StandingLooks::bytes(grid)) +
          HistoryStarts::bytes(grid.cells()) + SceneWatch::bytes(grid);
 }
@@ -146,14 +149,16 @@ void FrameFollower::begin_scene() {
   disturbances_.forget();
   calm_ = 0;
   scene_begins_ = true;
+  memory_.find_standing(&standing_);
   // Where frames wait, they show the scene before until publish().
   if (context_.room.models == Models::two_of_live) forget_places();
 }
 
-// In other colours the places are the same, and their background is known.
 void FrameFollower::forget_places() {
-  memory_.forget();
-  if (colours_begin_) memory_.grow_up();
+  if (colours_begin_)
+    memory_.begin_colours(standing_);
+  else
+    memory_.forget();
 }
 
 void FrameFollower::write(std::vector<LearntPlace>* places) const {

@@ -111,7 +111,8 @@ class FrameFollower {
   GridFrames unclipped_;  // of a frame
   int published_ = 0;
   LightOfFrames light_;
-  SceneMemory memory_;  // what frames that came showed
+  SceneMemory memory_;             // what frames that came showed
+  std::vector<uint8_t> standing_;  // by cells: what stood before a scene that was left
   Disturbances disturbances_;
   StandingLooks looks_;  // what frames showed when they were compared, in batch
   HistoryStarts absorbed_;

@@ -58,6 +58,20 @@ void SceneMemory::forget() {
   news_ = false;
 }
 
+void SceneMemory::find_standing(std::vector<uint8_t>* stands) const {
+  for (size_t cell = 0; cell < differs_.size(); ++cell)
+    (*stands)[cell] = differs_[cell] && of(static_cast<int>(cell)) != Of::left;
+}
+
+void SceneMemory::begin_colours(const std::vector<uint8_t>& stands) {
+  const int64_t now = looks_.newest();
+  forget();
+  grow_up();
+  // Its look in these colours is yet to come.
+  for (size_t cell = 0; cell < stands.size(); ++cell)
+    if (stands[cell]) said_.decide(static_cast<int>(cell), Of::came, now + StandingLooks::kSteady);
+}
+
 void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
   const int at = static_cast<int>(cell);
   looks_.write(cell, now, out);
@@ -336,7 +350,8 @@ void SceneMemory::hand_over(Proofs* solve) {
     }
     solve->any = true;
     solve->came[cell] = 1;
-    solve->since[cell] = said == Of::came ? said_.since(at) : Proofs::kUnsure;
+    solve->since[cell] =
+        said == Of::came ? std::min(said_.since(at), looks_.since(at)) : Proofs::kUnsure;
   }
   // What stands there reaches into the cells around.
   for (size_t cell = 0; cell < marks_.size(); ++cell)

@@ -70,6 +70,11 @@ class SceneMemory {
     followed_ = std::max(followed_, young_frames_);
     shown_.grow_up();
   }
+  // Marks where something stands before the background now.
+  void find_standing(std::vector<uint8_t>* stands) const;
+  // The same places in other colours: their background is known, and what stands there, by cells,
+  // goes on to.
+  void begin_colours(const std::vector<uint8_t>& stands);
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
     looks_.follow(frame, gain, number);
