@@ -379,9 +379,10 @@ const Camera kCameras[] = {
 };
 
 // F of the masks of frames that count, and how many of these are wrong in more than 2 % of the
-// picture.
+// picture. whites: of each frame, how many pixels are white; or null.
 std::pair<double, int> score(const Camera& camera, const EngineOptions& options, uint64_t seed,
-                             const char* name = "basic", int frames = kFrames) {
+                             const char* name = "basic", int frames = kFrames,
+                             std::vector<int>* whites = nullptr) {
   scene::SceneOptions how;
   how.width = kWidth, how.height = kHeight, how.frames_per_second = 25, how.seed = seed;
   scene::Scene scene(how, name);
@@ -395,6 +396,10 @@ std::pair<double, int> score(const Camera& camera, const EngineOptions& options,
     for (; engine.next(); ++left) {
       PackedPicture mask(kWidth, kHeight);
       engine.next()->pop(Output::mask, mask.out());
+      if (whites) {
+        whites->push_back(0);
+        for (size_t p = 0; p < truth[0].size(); ++p) whites->back() += mask.at(0, p) > 127;
+      }
       if (left < camera.counts_from) continue;
       int differ = 0;
       for (size_t p = 0; p < truth[0].size(); ++p) {
@@ -450,6 +455,27 @@ TEST_P(CameraLight, MasksStayRight) {
       RecordProperty(camera.name, std::to_string(f));
       EXPECT_GE(f, 0.9) << camera.name << ", seed " << seed;
       EXPECT_LE(wrong, 10) << camera.name << ", seed " << seed;
+    }
+}
+
+// Black frames are no background, and nothing is in front of them: with a camera that starts, and
+// where one loses its picture.
+TEST(BlackFrames, AreTheSceneInNoLight) {
+  for (const int first : {0, 130})
+    for (const int count : {30, 60, 95}) {
+      // For longer it is another scene.
+      if (first > 0 && count > 60) continue;
+      SCOPED_TRACE(testing::Message() << count << " from " << first);
+      const Camera camera = {"black",
+                             [=](int t, size_t, float sample, float) {
+                               return t >= first && t < first + count ? 0.0f : sample;
+                             },
+                             first + count};
+      std::vector<int> white;
+      const auto [f, wrong] = score(camera, robust_of(100), 3, "basic", 330, &white);
+      EXPECT_GE(f, 0.85);
+      EXPECT_LE(wrong, 2);
+      for (int t = first; t < first + count; ++t) EXPECT_EQ(white[static_cast<size_t>(t)], 0) << t;
     }
 }
 

@@ -8,13 +8,18 @@
 
 namespace qdmd {
 
-// Frames that something disturbs have the light of those before them.
+// Frames that something disturbs have the light of those before them; black ones are the scene in
+// no light.
 void WindowSolve::carry_gains() {
   if (shown_.empty()) return;
   size_t at = 0;
   for (size_t t = 0; t < gains_.size(); ++t) {
     while (at + 1 < shown_.size() && static_cast<size_t>(shown_[at + 1]) <= t) ++at;
-    gains_[t] = gains_[static_cast<size_t>(shown_[at])];
+    const auto from = static_cast<size_t>(shown_[at]);
+    if (from != t && is_black(static_cast<int>(t)))
+      gains_[t].fill(steps::light::kLeastGain);
+    else
+      gains_[t] = gains_[from];
   }
 }
 

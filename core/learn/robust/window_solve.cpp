@@ -246,8 +246,13 @@ void WindowSolve::refine_light() {
   if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
   const Clock::Span span(*context_.room.clock, Clock::samples);
   refine_gains(window_->snapshots, shown_, &gains_);
+  if (!clips_) {
+    std::vector<Gain> gains;
+    for (const int t : shown_) gains.push_back(gains_[static_cast<size_t>(t)]);
+    settle_light(&gains);
+    for (size_t i = 0; i < gains.size(); ++i) gains_[static_cast<size_t>(shown_[i])] = gains[i];
+  }
   carry_gains();
-  if (!clips_) settle_light(&gains_);
 }
 
 // Those of the sampled rows are read soon.

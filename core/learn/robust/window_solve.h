@@ -87,6 +87,7 @@ class WindowSolve {
   void choose_shown(const Known& known, int old);
   bool leave_out_disturbed(const WindowLight& light, const GridFrames& median);
   GridPictures cells_of_shown() const;
+  bool is_black(int snapshot) const;
   void carry_gains();
   Gain light_of_earlier(const EarlierWindow& earlier, const GridFrames& here) const;
   bool has_ends(const EarlierWindow& earlier, const Gain& of_earlier, const GridFrames& here) const;

@@ -101,12 +101,21 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   return looks;
 }
 
-// Frames that something disturbs say nothing, where others do.
+// A camera that has no picture yet, or none any more.
+bool WindowSolve::is_black(int snapshot) const {
+  const GridFrames& cells = context_.room.frames->cells();
+  const float* const levels = cells.plane(window_->snapshots.slot(snapshot), 0);
+  return std::all_of(levels, levels + kChannels * cells.cells(),
+                     [](float level) { return level < steps::light::kDark; });
+}
+
+// Frames that something disturbs say nothing, where others do; nor do black ones.
 void WindowSolve::choose_shown(const Known& known, int old) {
   const int m = window_->snapshots.size();
   shown_.clear();
   for (int t = 0; t < m; ++t)
-    if (!known.earlier->known() || !known.history->disturbances().has(window_->number(t)))
+    if ((!known.earlier->known() || !known.history->disturbances().has(window_->number(t))) &&
+        !is_black(t))
       shown_.push_back(t);
   if (!shown_.empty() || old > 0) return;
   shown_.resize(static_cast<size_t>(m));
