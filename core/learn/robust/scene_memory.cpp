@@ -35,7 +35,6 @@ SceneMemory::SceneMemory(const Grid& grid, bool live)
       differs_(grid.cells()),
       unjudged_(grid.cells()),
       marks_(grid.cells()),
-      stands_(grid.cells()),
       young_frames_(live ? kYoungFrames : 0),
       settled_(live ? kSettledOfLive : kSettled) {
   found_.reserve(grid.cells());
@@ -46,7 +45,7 @@ SceneMemory::SceneMemory(const Grid& grid, bool live)
 uint64_t SceneMemory::bytes(const Grid& grid) {
   const uint64_t cells = grid.cells();
   return StandingLooks::bytes(grid) + HistoryStarts::bytes(cells) + Judgements::bytes(cells) +
-         ShownCounts::bytes(cells) + cells * (4 * sizeof(uint8_t) + 3 * sizeof(int));
+         ShownCounts::bytes(cells) + cells * (3 * sizeof(uint8_t) + 3 * sizeof(int));
 }
 
 void SceneMemory::forget() {
@@ -56,7 +55,6 @@ void SceneMemory::forget() {
   said_.forget();
   shown_.forget();
   std::fill(differs_.begin(), differs_.end(), uint8_t{0});
-  std::fill(stands_.begin(), stands_.end(), uint8_t{0});
   news_ = false;
 }
 
@@ -72,7 +70,6 @@ void SceneMemory::begin_colours(const std::vector<uint8_t>& stands) {
   // Its look in these colours is yet to come.
   for (size_t cell = 0; cell < stands.size(); ++cell)
     if (stands[cell]) said_.decide(static_cast<int>(cell), Of::came, now + StandingLooks::kSteady);
-  stands_ = stands;
 }
 
 void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
@@ -150,7 +147,6 @@ SceneMemory::Motion SceneMemory::motion_around(const std::vector<int>& region,
 void SceneMemory::decide(const std::vector<int>& region, Of of) {
   for (int cell : region) {
     said_.decide(cell, of, looks_.since(cell));
-    stands_[static_cast<size_t>(cell)] = of == Of::came;
     if (of != Of::left) continue;
     said_.note_left(cell, looks_.newest());
     uncovered_.add(cell, looks_.since(cell));
@@ -173,9 +169,7 @@ bool SceneMemory::left_beside(const std::vector<int>& region) const {
 bool SceneMemory::came_beside(const std::vector<int>& region) const {
   bool found = false;
   for (int cell : region)
-    each_near(grid_, cell, 1, [&](int near) {
-      found |= of(near) == Of::came || stands_[static_cast<size_t>(near)] != 0;
-    });
+    each_near(grid_, cell, 1, [&](int near) { found |= of(near) == Of::came; });
   return found;
 }
 
@@ -243,9 +237,6 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
   }
   looks_.find_differing(background, &differs_, &differing_);
   shown_.count(looks_, differs_, background);
-  for (size_t cell = 0; cell < stands_.size(); ++cell)
-    if (stands_[cell] && !differs_[cell] && looks_.shows_look(static_cast<int>(cell)))
-      stands_[cell] = 0;
   const bool any_left =
       said_.newest_left() != Judgements::kNever && looks_.newest() - said_.newest_left() <= kPieces;
   if (differing_.size() < kLeastRegion && (differing_.empty() || !any_left)) return found_;

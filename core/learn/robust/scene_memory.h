@@ -43,8 +43,8 @@ struct Proofs {
 // | much stronger, and nothing has settled for 2 kMoves frames         | left                    |
 // | both proofs are clear (kClear, kClearBoth), in a larger region     | left, at once           |
 // | a few cells beside what left, which changed when that did          | left                    |
-// | it lies beside what came, or in its place: the background's        | left                    |
-// |   contour must be much stronger                                    |                         |
+// | it lies beside what came: the background's contour must be much    | left                    |
+// |   stronger                                                         |                         |
 // | looks came all over the picture at once, and nothing went there    | nothing, for kLasts     |
 // | most of the picture differs                                        | nothing, for kLasts;    |
 // |                                                                    |   then left: no object  |
@@ -137,7 +137,6 @@ class SceneMemory {
   Judgements said_;
   ShownCounts shown_;
   std::vector<uint8_t> differs_, unjudged_, marks_;  // by cells
-  std::vector<uint8_t> stands_;  // by cells: something came, and its background was not seen since
   std::vector<int> found_, around_, differing_;
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;
