@@ -256,6 +256,42 @@ TEST(SceneMemory, BeforeThatItIsNotDecided) {
 }
 
 // What comes next to the same place is judged by itself.
+// A camera that switches to infra-red shows the same things in other colours.
+TEST(SceneMemory, WhatStandsWhereColoursGoStandsInTheNewOnes) {
+  constexpr Rect kWhole = {0, 0, kRows, kCols}, kOther = {2, 22, 6, 6};
+  const auto in_other_colours = [&](bool stands) {
+    Stage stage;
+    stage.bag_comes();
+    // Judged or not.
+    stage.frames(kSteady);
+    std::vector<uint8_t> standing(stage.grid.cells());
+    stage.memory.find_standing(&standing);
+    for (int cell = 0; cell < kRows * kCols; ++cell)
+      EXPECT_EQ(standing[static_cast<size_t>(cell)] != 0, kPlace.has(cell / kCols, cell % kCols));
+    if (!stands) standing.assign(standing.size(), 0);
+    stage.memory.begin_colours(standing);
+    stage.know(kWhole, kFloor + 50);
+    stage.show(kWhole, kFloor + 50);
+    stage.show(kPlace, kBag + 50);
+    stage.say(clear());
+    return stage;
+  };
+  EXPECT_LE(in_other_colours(false).frames_until_found(100), kSteady);
+  Stage stage = in_other_colours(true);
+  const int64_t first = stage.number + 1;
+  EXPECT_GT(stage.frames_until_found(100), 100);
+  const size_t inside = static_cast<size_t>(stage.cell(kPlace.top + 3, kPlace.left + 3));
+  EXPECT_TRUE(stage.proofs().came[inside]);
+  EXPECT_EQ(stage.proofs().since[inside], first);
+  // What changes later is judged as ever, there and elsewhere.
+  stage.show(kOther, kBag);
+  EXPECT_LE(stage.frames_until_found(100), kSteady);
+  stage.know_what_is_seen();
+  stage.know(kPlace, kFloor + 50);
+  stage.show(kPlace, 220);
+  EXPECT_LE(stage.frames_until_found(100), kSteady);
+}
+
 TEST(SceneMemory, AnotherLookIsJudgedAnew) {
   Stage stage;
   stage.bag_comes();
