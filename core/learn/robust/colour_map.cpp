@@ -19,8 +19,9 @@ bool is_at_end(const float* const picture[kChannels], size_t cell) {
          steps::light::kMeasured;
 }
 
-uint8_t rounded(float level) {
-  return static_cast<uint8_t>(std::clamp(level + 0.5f, 0.0f, 255.0f));
+uint8_t rounded(float level, uint8_t least, uint8_t most) {
+  return static_cast<uint8_t>(
+      std::clamp(level + 0.5f, static_cast<float>(least), static_cast<float>(most)));
 }
 
 // The map of samples that is `map` of cells.
@@ -109,19 +110,21 @@ Colouring colouring_of(const float* const cells[kChannels], const float* const o
   return colour > kSome * level ? Colouring::some : Colouring::little;
 }
 
-void recolour(const ColourMap& map, size_t count, uint8_t* const level[kChannels]) {
+void recolour(const ColourMap& map, const SampleRange& range, size_t count,
+              uint8_t* const level[kChannels]) {
   for (size_t p = 0; p < count; ++p) {
     const auto now = map.of({static_cast<float>(level[0][p]), static_cast<float>(level[1][p]),
                              static_cast<float>(level[2][p])});
-    for (size_t c = 0; c < kChannels; ++c) level[c][p] = rounded(now[c]);
+    for (size_t c = 0; c < kChannels; ++c)
+      level[c][p] = rounded(now[c], range.least[c], range.most[c]);
   }
 }
 
-void recolour(const ColourMap& map, Learnt* learnt) {
+void recolour(const ColourMap& map, const SampleRange& range, Learnt* learnt) {
   OwnedPicture& picture = learnt->picture;
   uint8_t* const level[kChannels] = {picture.level[0].data(), picture.level[1].data(),
                                      picture.level[2].data()};
-  recolour(map, picture.level[0].size(), level);
+  recolour(map, range, picture.level[0].size(), level);
   // The bits below are those of other levels: the middle of what they can be.
   for (auto& below : picture.below)
     for (uint8_t& bits : below) bits = static_cast<uint8_t>(1 << (picture.depth - 9));
@@ -129,7 +132,7 @@ void recolour(const ColourMap& map, Learnt* learnt) {
   LearntEarlier& earlier = *learnt->earlier;
   uint8_t* const known[kChannels] = {earlier.level[0].data(), earlier.level[1].data(),
                                      earlier.level[2].data()};
-  recolour(map, earlier.level[0].size(), known);
+  recolour(map, range, earlier.level[0].size(), known);
   earlier.places.clear();
 }
 

@@ -42,8 +42,10 @@ inline Colouring colouring_of(const float* const cells[kChannels], size_t count)
   return colouring_of(cells, cells, count);
 }
 
-// `count` pixels of a picture, and what a window knows.
-void recolour(const ColourMap& map, size_t count, uint8_t* const level[kChannels]);
-void recolour(const ColourMap& map, Learnt* learnt);
+// `count` pixels of a picture, and what a window knows. What becomes too bright for the samples'
+// range ends there, as a camera's does.
+void recolour(const ColourMap& map, const SampleRange& range, size_t count,
+              uint8_t* const level[kChannels]);
+void recolour(const ColourMap& map, const SampleRange& range, Learnt* learnt);
 
 }  // namespace qdmd

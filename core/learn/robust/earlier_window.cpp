@@ -48,7 +48,7 @@ void EarlierWindow::take(const Grid& grid, const ReferencePicture& background,
 
 void EarlierWindow::recolour(const RobustContext& context, const ColourMap& map) {
   uint8_t* const level[kChannels] = {level_[0].data(), level_[1].data(), level_[2].data()};
-  qdmd::recolour(map, level_[0].size(), level);
+  qdmd::recolour(map, context.range(), level_[0].size(), level);
   context.find_cells(level, &cells_, 0);
 }
 

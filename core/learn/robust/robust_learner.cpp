@@ -120,7 +120,7 @@ void RobustLearner::begin_scene(bool returns) {
 
 bool RobustLearner::recolour(Learnt* learnt) const {
   const ColourMap* const map = follower_.new_colours();
-  if (map) qdmd::recolour(*map, learnt);
+  if (map) qdmd::recolour(*map, context_.range(), learnt);
   return map != nullptr;
 }
 
