@@ -303,8 +303,8 @@ TEST(ColourMaps, WhatIsTooBrightSaysNothing) {
   for (size_t c = 0; c < 3; ++c) twice.row[c][c] = 2;
   const auto recoloured = [&](const SampleRange& range) {
     uint8_t of[3][2] = {{60, 130}, {60, 130}, {2, 130}};
-    uint8_t* const level[3] = {of[0], of[1], of[2]};
-    recolour(twice, range, 2, level);
+    uint8_t* const levels[3] = {of[0], of[1], of[2]};
+    recolour(twice, range, 2, levels);
     return std::array<int, 6>{of[0][0], of[0][1], of[1][0], of[1][1], of[2][0], of[2][1]};
   };
   EXPECT_EQ(recoloured({}), (std::array<int, 6>{120, 255, 120, 255, 4, 255}));
