@@ -147,7 +147,7 @@ void Landmarks::read(const GreyView& frame, const Pose& pose, const GreyLight& l
   const auto lit = [&](size_t i) { return gain * (level_[i] - 128) + 128 + offset; };
   const auto count = static_cast<size_t>(count_);
   const ptrdiff_t stride = frame.width;
-  const bool other_light = light.changed();
+  const bool other_light = light.is_other;
   if (pose.is_rest()) {
     for (size_t i = 0; i < count; ++i) {
       const uint8_t* const at = frame.samples + y_[i] * stride + x_[i];
@@ -247,8 +247,8 @@ Fit Landmarks::solved(Fit fit) const {
   }
   // For normal noise it is 0.87.
   fit.agree = inside > 0 ? std::min(1.0, likeness / 0.87 / inside) : 0;
-  // Where little of the canvas is in the frame, or nothing fits.
-  if (fitting < kFewest || inside < count_ / 4) return fit;
+  // Nothing fits.
+  if (fitting < kFewest) return fit;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kUnknown, kUnknown>;
   using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kUnknown, 1>;
   Matrix normal(kFree, kFree);
@@ -275,6 +275,9 @@ Fit Landmarks::solved(Fit fit) const {
   fit.error = std::sqrt(variance * std::max(squares / weights, 1.0 / 12));
   fit.light.gain += solution(0);
   fit.light.offset += solution(1);
+  fit.light_known = true;
+  // Little of the canvas is in the frame, or too bright or too dark to say more.
+  if (inside < count_ / 4) return fit;
   Pose step;
   step.x = solution(2), step.y = solution(3);
   if constexpr (kFree == kUnknown) {
@@ -291,7 +294,7 @@ double Landmarks::share_within(const GreyView& frame, int x, int y, const GreyLi
                                double limit) const {
   const auto gain = static_cast<float>(1 + light.gain), offset = static_cast<float>(light.offset);
   const auto most = static_cast<float>(limit);
-  const bool other_light = light.changed();
+  const bool other_light = light.is_other;
   const ptrdiff_t stride = frame.width;
   int inside = 0, within = 0;
   for (size_t i = 0; i < static_cast<size_t>(count_); ++i) {

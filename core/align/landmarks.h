@@ -2,7 +2,6 @@
 // Pixels of a picture by which its place is found in other pictures.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -21,8 +20,9 @@ struct GreyView {
 // offset, where `level` is a level of the landmarks' own picture.
 struct GreyLight {
   double gain = 0, offset = 0;
-  // So much that samples at the end of their range show other edges.
-  bool changed() const { return std::abs(gain) > 0.03 || std::abs(offset) > 4; }
+  // It is another one than the landmarks' picture has: samples at the end of their range show other
+  // edges then, and say nothing.
+  bool is_other = false;
 };
 
 // How a frame fits at a pose.
@@ -33,8 +33,9 @@ struct Fit {
   // Share of the landmarks inside the frame that fit before the step, 0 .. 1. Each counts the more
   // the better it fits: 1 less Tukey's loss.
   double agree = 0;
-  double error = 0;    // pixels: the standard deviation of the step's shift
-  bool known = false;  // there were enough of them
+  double error = 0;          // pixels: the standard deviation of the step's shift
+  bool known = false;        // there were enough of them
+  bool light_known = false;  // or enough for the light alone
 };
 
 // Pixels at edges, spread over the picture.

@@ -37,8 +37,15 @@ constexpr double kTypical = 0.6;
 // can fit still: leaves near the camera, of which many move alike, leave more. The share grows to
 // that from half of kFar on.
 constexpr double kClearly = 0.1, kNear = 0.3, kFarClearly = 0.2, kFar = 8;
+// A light that differs by more, a share and levels, moves edges at the end of samples' range.
+constexpr double kOtherGain = 0.03, kOtherOffset = 4;
 // Levels: frames that differ by more from the first reference may have been moved.
 constexpr double kFirstNoise = 4;
+
+// So much of another light that samples at the end of their range show other edges.
+bool changes_edges(const GreyLight& light) {
+  return std::abs(light.gain) > kOtherGain || std::abs(light.offset) > kOtherOffset;
+}
 
 Pose at_level(const Pose& pose, size_t level) {
   const double share = std::ldexp(1.0, -static_cast<int>(level));
@@ -180,7 +187,14 @@ Motion MotionFinder::find(const uint8_t* grey, const Pose& before, const Pose& r
     return motion;
   };
   Landmarks& marks = levels_[0].marks;
-  const Fit look = marks.step(view(0, grey), rest, light_, turns);
+  light_.is_other = changes_edges(light_);
+  Fit look = marks.step(view(0, grey), rest, light_, turns);
+  // Where most is too bright to say anything, the reference's own light may be back.
+  if (!blank_ && !look.known && light_.is_other) {
+    if (look.light_known) light_ = look.light;
+    const Fit same = marks.step(view(0, grey), rest, GreyLight(), turns);
+    if (same.known && same.agree >= kRestAgree && same.noise < 1 + 1.5 * noise_) look = same;
+  }
   // A picture without edges shows no motion.
   if (blank_ || !look.known) {
     motion.pose = rest;

@@ -23,7 +23,10 @@ bool BatchSchedule::take_in(const ImageView& frame) {
   if (queue_.pending == 0) begin_stream();
   if (!collection_) {
     collection_ = Collection{taken(), freeze()};
-    collection_->scene = std::exchange(scene_from_, std::nullopt);
+    if (const auto from = std::exchange(scene_from_, std::nullopt)) {
+      collection_->scene = from->frame;
+      collection_->other_colours = from->other_colours;
+    }
     if (!waiting_) decide();
   }
   if (!take(frame)) return false;
@@ -148,8 +151,10 @@ void BatchSchedule::end_window(bool at_once) {
   Collection window = *std::exchange(collection_, std::nullopt);
   // It may be a disturbance, which the next window will know, if that is long enough.
   if (window.scene && !window.scene_returns && !break_ &&
-      taken() - *window.scene < steps::scene::kLasts)
-    scene_from_ = std::exchange(window.scene, std::nullopt);
+      taken() - *window.scene < steps::scene::kLasts) {
+    scene_from_ = SceneStart{*window.scene, window.other_colours};
+    window.scene.reset();
+  }
   if (window.scene && *window.scene < window.begin) window.scene = window.begin;
   waiting_ =
       Stretch{window.begin, taken(), window.begin, window.scene ? State::learnt : window.state};

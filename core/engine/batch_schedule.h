@@ -96,8 +96,12 @@ class BatchSchedule : public Schedule {
   std::optional<Stretch> waiting_;
   std::optional<Collection> collection_;
   std::optional<Loaded> loaded_;
-  // The first frame of another scene, or of a disturbance, that a window before ended in.
-  std::optional<int64_t> scene_from_;
+  // Another scene, or a disturbance, that a window before ended in.
+  struct SceneStart {
+    int64_t frame;
+    bool other_colours;
+  };
+  std::optional<SceneStart> scene_from_;
   std::optional<Work> work_;
   bool put_off_ = false;  // until the window's first frame leaves
 };

@@ -255,7 +255,6 @@ TEST(SceneMemory, BeforeThatItIsNotDecided) {
   EXPECT_TRUE(has_all(stage.frames(1), kPlace));
 }
 
-// What comes next to the same place is judged by itself.
 // A camera that switches to infra-red shows the same things in other colours.
 TEST(SceneMemory, WhatStandsWhereColoursGoStandsInTheNewOnes) {
   constexpr Rect kWhole = {0, 0, kRows, kCols}, kOther = {2, 22, 6, 6};
@@ -290,8 +289,14 @@ TEST(SceneMemory, WhatStandsWhereColoursGoStandsInTheNewOnes) {
   stage.know(kPlace, kFloor + 50);
   stage.show(kPlace, 220);
   EXPECT_LE(stage.frames_until_found(100), kSteady);
+  // Who goes together with the colours is gone.
+  Stage gone = in_other_colours(true);
+  gone.show(kWhole, kFloor + 50);
+  gone.frames(3 * kSteady);
+  EXPECT_FALSE(gone.proofs().any);
 }
 
+// What comes next to the same place is judged by itself.
 TEST(SceneMemory, AnotherLookIsJudgedAnew) {
   Stage stage;
   stage.bag_comes();

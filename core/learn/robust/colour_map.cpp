@@ -100,7 +100,7 @@ Colouring colouring_of(const float* const cells[kChannels], const float* const o
   size_t seen = 0;
   for (size_t cell = 0; cell < count; cell += kEach) {
     const float a = cells[0][cell], b = cells[1][cell], c = cells[2][cell];
-    if (is_at_end(cells, cell) || is_at_end(other, cell)) continue;
+    if (other && (is_at_end(cells, cell) || is_at_end(other, cell))) continue;
     colour += static_cast<double>(std::max({a, b, c}) - std::min({a, b, c}));
     level += static_cast<double>((a + b + c) / 3);
     ++seen;

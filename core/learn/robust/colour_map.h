@@ -33,14 +33,11 @@ std::optional<ColourMap> find_colour_map(const float* const frame[kChannels],
                                          const RgbColours& colours = {});
 
 // How coloured a picture is: none where hardly any cell has a colour, some where many have. Cells
-// with samples at the end of their range, in this picture or the other one, have lost their colour
-// and say nothing; little: few others are left.
+// with samples at the end of their range, in this picture or the other one (null: there is none),
+// have lost their colour and say nothing; little: few others are left.
 enum class Colouring { none, little, some };
 Colouring colouring_of(const float* const cells[kChannels], const float* const other[kChannels],
                        size_t count);
-inline Colouring colouring_of(const float* const cells[kChannels], size_t count) {
-  return colouring_of(cells, cells, count);
-}
 
 // `count` pixels of a picture, and what a window knows. What becomes too bright for the samples'
 // range ends there, as a camera's does.

@@ -140,6 +140,7 @@ SceneSeen FrameFollower::colours_of(const Cells& frame) {
   if (!returns && !new_colours_) return SceneSeen::same;
   other_coloured_ = 0;
   colours_begin_ = true;
+  memory_.find_standing(&standing_);
   left_colours_ = known;
   return returns ? SceneSeen::earlier_colours : SceneSeen::other_colours;
 }
@@ -149,7 +150,6 @@ void FrameFollower::begin_scene() {
   disturbances_.forget();
   calm_ = 0;
   scene_begins_ = true;
-  memory_.find_standing(&standing_);
   // Where frames wait, they show the scene before until publish().
   if (context_.room.models == Models::two_of_live) forget_places();
 }
@@ -174,6 +174,8 @@ void FrameFollower::read(const LearntEarlier& from) {
   if (from.places.empty()) return;
   const int64_t now = newest_number();
   each_with_its(context_.grid, from.rows, from.cols, [&](size_t cell, size_t its) {
+    // What stands there now came since.
+    if (colours_begin_ && !standing_.empty() && standing_[cell]) return;
     const LearntPlace& place = from.places[its];
     if (context_.room.models != Models::two_of_live) looks_.read(cell, now, place);
     if (memory_.read(cell, now, place)) absorbed_.read(cell, now, place);

@@ -112,7 +112,7 @@ class FrameFollower {
   int published_ = 0;
   LightOfFrames light_;
   SceneMemory memory_;             // what frames that came showed
-  std::vector<uint8_t> standing_;  // by cells: what stood before a scene that was left
+  std::vector<uint8_t> standing_;  // by cells: something stands when colours change
   Disturbances disturbances_;
   StandingLooks looks_;  // what frames showed when they were compared, in batch
   HistoryStarts absorbed_;

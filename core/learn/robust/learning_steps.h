@@ -44,6 +44,8 @@ QDMD_STEP float kOther = step("light.other", 20.0f);
 // Levels: a darker frame that is so near to the darkest ones' median, a channel's mean, shows the
 // same.
 QDMD_STEP float kNearMedian = step("light.near_median", 8.0f);
+// Levels: a frame without any picture has no cell above it.
+QDMD_STEP float kBlack = step("light.black", 2.0f);
 // Frames that say what is behind such samples: the darkest one in so many, but so many at least.
 QDMD_STEP size_t kDarkOf = step("light.dark_of", size_t{6});
 QDMD_STEP size_t kLeastDark = step("light.least_dark", size_t{5});

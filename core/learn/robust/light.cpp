@@ -97,6 +97,7 @@ Gain shared_gain(const float* const frame[3], const float* const reference[3], s
   near.clear();
   for (const auto& [ratio, cell] : ratios)
     if (std::abs(ratio - mode) < kNear) near.push_back(std::exp(ratio));
+  if (near.empty()) return gain;
   const float all = std::max(median(&near), kLeastGain);
   const bool tinted = std::any_of(gain.begin(), gain.end(), [all](float of_channel) {
     return kOfColour * std::abs(std::log(of_channel / all)) > kStill;

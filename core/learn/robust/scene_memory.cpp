@@ -56,6 +56,7 @@ void SceneMemory::forget() {
   shown_.forget();
   std::fill(differs_.begin(), differs_.end(), uint8_t{0});
   news_ = false;
+  stood_until_ = StandingLooks::kNever;
 }
 
 void SceneMemory::find_standing(std::vector<uint8_t>* stands) const {
@@ -68,8 +69,19 @@ void SceneMemory::begin_colours(const std::vector<uint8_t>& stands) {
   forget();
   grow_up();
   // Its look in these colours is yet to come.
+  stood_until_ = now + StandingLooks::kSteady;
   for (size_t cell = 0; cell < stands.size(); ++cell)
-    if (stands[cell]) said_.decide(static_cast<int>(cell), Of::came, now + StandingLooks::kSteady);
+    if (stands[cell]) said_.decide(static_cast<int>(cell), Of::came, stood_until_);
+}
+
+// What stood there may have gone together with the colours.
+void SceneMemory::forget_what_went() {
+  if (looks_.newest() > stood_until_ + StandingLooks::kSteady) return;
+  for (size_t cell = 0; cell < differs_.size(); ++cell) {
+    const int at = static_cast<int>(cell);
+    if (!differs_[cell] && looks_.shows_look(at) && of(at) == Of::came)
+      said_.decide(at, Of::none, looks_.since(at));
+  }
 }
 
 void SceneMemory::write(size_t cell, int64_t now, LearntPlace* out) const {
@@ -237,6 +249,7 @@ const std::vector<int>& SceneMemory::judge(const float* const background[3],
   }
   looks_.find_differing(background, &differs_, &differing_);
   shown_.count(looks_, differs_, background);
+  forget_what_went();
   const bool any_left =
       said_.newest_left() != Judgements::kNever && looks_.newest() - said_.newest_left() <= kPieces;
   if (differing_.size() < kLeastRegion && (differing_.empty() || !any_left)) return found_;
@@ -273,7 +286,7 @@ bool SceneMemory::is_most_of_picture() const {
 
 // A cloud is no look of its own: masks know the background in less light, by its colours.
 void SceneMemory::leave_out_shaded(const float* const background[3]) {
-  if (colouring_of(background, grid_.cells()) == Colouring::none) return;
+  if (colouring_of(background, nullptr, grid_.cells()) == Colouring::none) return;
   std::erase_if(differing_, [&](int cell) {
     float look = 0, of_background = 0, rest = 0;
     for (int c = 0; c < kChannels; ++c) {
@@ -350,8 +363,7 @@ void SceneMemory::hand_over(Proofs* solve) {
     }
     solve->any = true;
     solve->came[cell] = 1;
-    solve->since[cell] =
-        said == Of::came ? std::min(said_.since(at), looks_.since(at)) : Proofs::kUnsure;
+    solve->since[cell] = said == Of::came ? looks_.since(at) : Proofs::kUnsure;
   }
   // What stands there reaches into the cells around.
   for (size_t cell = 0; cell < marks_.size(); ++cell)

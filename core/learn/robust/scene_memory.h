@@ -70,10 +70,10 @@ class SceneMemory {
     followed_ = std::max(followed_, young_frames_);
     shown_.grow_up();
   }
-  // Marks where something stands before the background now.
+  // Marks where something stands before the background.
   void find_standing(std::vector<uint8_t>* stands) const;
-  // The same places in other colours: their background is known, and what stands there, by cells,
-  // goes on to.
+  // The same places in other colours: their background is known, and where `stands` says so,
+  // something still stands before it.
   void begin_colours(const std::vector<uint8_t>& stands);
   // The next frame of the stream, its levels divided by `gain`. number: counts frames.
   void follow(const float* const frame[3], const Gain& gain, int64_t number) {
@@ -124,6 +124,7 @@ class SceneMemory {
   bool is_all_over(int64_t since) const;
   bool left_beside(const std::vector<int>& region) const;
   void widen(const float* const background[3]);
+  void forget_what_went();
   void leave_out_shaded(const float* const background[3]);
   bool is_most_of_picture() const;
   void judge_as_one();
@@ -141,6 +142,8 @@ class SceneMemory {
   bool news_ = false;
   int64_t young_frames_ = 0, followed_ = 0;
   double settled_ = 0;  // kSettled, or that of live
+  // Looks that came until then in cells that are marked stood there in other colours.
+  int64_t stood_until_ = StandingLooks::kNever;
 };
 
 }  // namespace qdmd

@@ -98,12 +98,17 @@ float apart(const GridPictures& frames, int a, int b, size_t cell) {
 // Where contours chose another look than the one that most frames show.
 void note_rejected(const GridPictures& frames, int looks, std::span<const int> most_shown,
                    std::span<const int> from, StableFrames* stable) {
-  stable->rejected = Rejected(static_cast<size_t>(looks));
   const float most = kChannels * steps::contours::kLooksDiffer;
+  const auto is_other = [&](size_t cell) {
+    return apart(frames, from[cell], most_shown[cell], cell) > most;
+  };
+  size_t count = 0;
+  for (size_t cell = 0; cell < from.size(); ++cell) count += is_other(cell) ? 1 : 0;
+  stable->rejected = Rejected(count, static_cast<size_t>(looks));
   for (size_t cell = 0; cell < from.size(); ++cell) {
-    if (apart(frames, from[cell], most_shown[cell], cell) <= most) continue;
+    if (!is_other(cell)) continue;
     const auto shown = stable->of_cell[cell];
-    stable->rejected.add(static_cast<int>(cell), static_cast<size_t>(looks), [&](size_t t) {
+    stable->rejected.add(static_cast<int>(cell), [&](size_t t) {
       const auto at = static_cast<int>(t);
       return !std::binary_search(shown.begin(), shown.end(), static_cast<uint16_t>(t)) &&
              apart(frames, at, most_shown[cell], cell) < apart(frames, at, from[cell], cell);

@@ -68,13 +68,16 @@ class FrameLists {
   std::vector<uint16_t> counts_, chosen_, frames_;
 };
 
-// Frames of cells where contours say that most frames show something else than the background, and
-// it differs from it by more than light does (contours.looks_differ).
+// Frames that show what contours rejected: something else than the background, which most frames
+// show. It differs by more than light does (contours.looks_differ).
 class Rejected {
  public:
   Rejected() = default;
-  // Of `looks` frames.
-  explicit Rejected(size_t looks) : each_((looks + 7) / 8) {}
+  // Of `looks` frames, for so many cells.
+  Rejected(size_t cells, size_t looks) : looks_(looks), each_((looks + 7) / 8) {
+    cells_.reserve(cells);
+    bits_.reserve(cells * each_);
+  }
   static uint64_t bytes(uint64_t cells, uint64_t looks) {
     return cells * (sizeof(int) + (looks + 7) / 8);
   }
@@ -87,16 +90,16 @@ class Rejected {
   }
   // Adds a cell and its frames, those with shows(look).
   template <typename Shows>
-  void add(int cell, size_t looks, Shows shows) {
+  void add(int cell, Shows shows) {
     cells_.push_back(cell);
     bits_.resize(bits_.size() + each_);
     uint8_t* const bits = bits_.data() + bits_.size() - each_;
-    for (size_t t = 0; t < looks; ++t)
+    for (size_t t = 0; t < looks_; ++t)
       bits[t / 8] = static_cast<uint8_t>(bits[t / 8] | (shows(t) ? 1 : 0) << (t % 8));
   }
 
  private:
-  size_t each_ = 0;
+  size_t looks_ = 0, each_ = 0;
   std::vector<int> cells_;
   std::vector<uint8_t> bits_;
 };

@@ -16,7 +16,7 @@ void WindowSolve::carry_gains() {
   for (size_t t = 0; t < gains_.size(); ++t) {
     while (at + 1 < shown_.size() && static_cast<size_t>(shown_[at + 1]) <= t) ++at;
     const auto from = static_cast<size_t>(shown_[at]);
-    if (from != t && is_black(static_cast<int>(t)))
+    if (from != t && is_black(window_->snapshots.slot(static_cast<int>(t))))
       gains_[t].fill(steps::light::kLeastGain);
     else
       gains_[t] = gains_[from];
@@ -46,8 +46,8 @@ void WindowSolve::take_unit_of(const GridFrames& earlier, const Gain& gain, Grid
   for (size_t c = 0; c < kChannels; ++c) {
     const float unit = darker ? std::max(gain[c], steps::light::kDarkest) : 1;
     for (Gain& of_frame : gains_) of_frame[c] /= unit;
-    float darkest = gains_[0][c];
-    for (const Gain& of_frame : gains_) darkest = std::min(darkest, of_frame[c]);
+    float darkest = shown_.empty() ? gains_[0][c] : gains_[static_cast<size_t>(shown_[0])][c];
+    for (const int t : shown_) darkest = std::min(darkest, gains_[static_cast<size_t>(t)][c]);
     float* const levels = here->plane(0, static_cast<int>(c));
     const float* const known = earlier.plane(0, static_cast<int>(c));
     for (size_t cell = 0; cell < cells; ++cell) {

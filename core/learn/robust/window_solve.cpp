@@ -136,7 +136,7 @@ void WindowSolve::find_foreground(const SolveHistory& history) {
     find_mask(reference_, snapshots.picture(t), light(t), bits,
               scratch.get() + worker * scratch_size);
     history.take_out(window_->number(t), bits);
-    // What clips differs from what shows it all, and is the same.
+    // Where samples clip, the same thing looks like two.
     if (!clips_) take_out_rejected(t, bits);
     if (clips_) fill_ends(t, bits);
   });
@@ -246,7 +246,7 @@ void WindowSolve::refine_light() {
   if (std::none_of(gains_.begin(), gains_.end(), is_lit)) return;
   const Clock::Span span(*context_.room.clock, Clock::samples);
   refine_gains(window_->snapshots, shown_, &gains_);
-  if (!clips_) {
+  if (!clips_ && !shown_.empty()) {
     std::vector<Gain> gains;
     for (const int t : shown_) gains.push_back(gains_[static_cast<size_t>(t)]);
     settle_light(&gains);
@@ -296,6 +296,10 @@ std::vector<Gain> WindowSolve::gains_of_frames(const GridFrames& background, int
     const auto before = static_cast<size_t>(t / stride);
     gain = gains_[before];
     if (t % stride == 0) continue;
+    if (is_black(all.slot(t))) {
+      gain.fill(steps::light::kLeastGain);
+      continue;
+    }
     gain = light_between(context_.room.frames->cells(), all.slot(t), background, at, gains_[before],
                          gains_[std::min(before + 1, gains_.size() - 1)]);
     if (is_lit(gain)) lit.push_back(t);

@@ -87,7 +87,7 @@ class WindowSolve {
   void choose_shown(const Known& known, int old);
   bool leave_out_disturbed(const WindowLight& light, const GridFrames& median);
   GridPictures cells_of_shown() const;
-  bool is_black(int snapshot) const;
+  bool is_black(int slot) const;
   void carry_gains();
   Gain light_of_earlier(const EarlierWindow& earlier, const GridFrames& here) const;
   bool has_ends(const EarlierWindow& earlier, const Gain& of_earlier, const GridFrames& here) const;
@@ -134,7 +134,8 @@ class WindowSolve {
   std::vector<uint8_t> spread_, reach_;
   std::vector<uint8_t> brightest_;  // of R, G and B of the background, where samples are others
   std::vector<Gain> gains_;         // of the snapshots
-  std::vector<int> shown_;          // the snapshots that nothing disturbs, in order
+  std::vector<int> shown_;          // the snapshots that show the scene, in order
+  bool any_black_ = false;          // some of the others are black
   bool clips_ = false;              // WindowLight::clips
   WindowMask mask_;                 // of the snapshots
   Window samples_;                  // filled

@@ -101,12 +101,13 @@ WindowSolve::Looks WindowSolve::gather(const Known& known) {
   return looks;
 }
 
-// A camera that has no picture yet, or none any more.
-bool WindowSolve::is_black(int snapshot) const {
+// The camera has no picture yet, or none any more, and other frames of the window have one.
+bool WindowSolve::is_black(int slot) const {
+  if (!any_black_) return false;
   const GridFrames& cells = context_.room.frames->cells();
-  const float* const levels = cells.plane(window_->snapshots.slot(snapshot), 0);
+  const float* const levels = cells.plane(slot, 0);
   return std::all_of(levels, levels + kChannels * cells.cells(),
-                     [](float level) { return level < steps::light::kDark; });
+                     [](float level) { return level < steps::light::kBlack; });
 }
 
 // Frames that something disturbs say nothing, where others do; nor do black ones.
@@ -114,9 +115,13 @@ void WindowSolve::choose_shown(const Known& known, int old) {
   const int m = window_->snapshots.size();
   shown_.clear();
   for (int t = 0; t < m; ++t)
-    if ((!known.earlier->known() || !known.history->disturbances().has(window_->number(t))) &&
-        !is_black(t))
+    if (!known.earlier->known() || !known.history->disturbances().has(window_->number(t)))
       shown_.push_back(t);
+  any_black_ = true;
+  const auto shows = std::stable_partition(
+      shown_.begin(), shown_.end(), [&](int t) { return !is_black(window_->snapshots.slot(t)); });
+  any_black_ = shows != shown_.begin() && shows != shown_.end();
+  if (any_black_) shown_.erase(shows, shown_.end());
   if (!shown_.empty() || old > 0) return;
   shown_.resize(static_cast<size_t>(m));
   std::iota(shown_.begin(), shown_.end(), 0);
