@@ -220,6 +220,19 @@ def test_a_time_lapse_is_told_by_its_rate():
     assert found(1) > 0.97 and found(25) < found(1) - 0.02
 
 
+def test_says_that_ignore_covers_the_whole_frame():
+    frame = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    half = (-3, -3, WIDTH // 2 + 3, HEIGHT + 9)
+    separator = qdmd.Separator(window_size=4, ignore=[half, (WIDTH // 2, 0, WIDTH, HEIGHT)])
+    with pytest.warns(UserWarning, match=f'covers the whole frame, which is {WIDTH}x{HEIGHT}'):
+        separator.apply(frame)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        separator.apply(frame)
+        separator.ignore([half])
+        separator.apply(frame)
+
+
 def test_says_once_what_ignore_has_outside_of_the_frame():
     frame = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     separator = qdmd.Separator(window_size=4, ignore=[(0, 0, 1, 1), (WIDTH, 0, 5, 5), (-5, 0, 5, 5)])
