@@ -216,11 +216,11 @@ class Separator:
         height, width = np.shape(frame)[:2]
         outside = [area for area in self._new_areas
                    if area[0] >= width or area[1] >= height or area[0] + area[2] <= 0 or area[1] + area[3] <= 0]
-        left = np.ones((height, width), dtype=bool) if self._new_areas else None
+        left = np.ones((height, width), dtype=bool)
         for x, y, columns, rows in self._new_areas:
-            left[max(y, 0):max(y + rows, 0), max(x, 0):max(x + columns, 0)] = False  # type: ignore[index]
+            left[max(y, 0):max(y + rows, 0), max(x, 0):max(x + columns, 0)] = False
         self._new_areas = []
-        if left is not None and left.size and not left.any():
+        if left.size and not left.any():
             warnings.warn(f'ignore covers the whole frame, which is {width}x{height}: nothing will ever be foreground',
                           stacklevel=3)
         if outside:

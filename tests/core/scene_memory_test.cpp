@@ -261,7 +261,7 @@ TEST(SceneMemory, WhatStandsWhereColoursGoStandsInTheNewOnes) {
   const auto in_other_colours = [&](bool stands) {
     Stage stage;
     stage.bag_comes();
-    // Judged or not.
+    // Nobody has judged it yet.
     stage.frames(kSteady);
     std::vector<uint8_t> standing(stage.grid.cells());
     stage.memory.find_standing(&standing);
